@@ -1,0 +1,81 @@
+# One function per kind of target, so that every folder of src/ and every test states only its
+# sources and what it depends on.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/bin")
+set(CMAKE_LIBRARY_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib")
+set(CMAKE_ARCHIVE_OUTPUT_DIRECTORY "${PROJECT_BINARY_DIR}/lib")
+
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+# -O3 also vectorises the scalar loops; -DNDEBUG stays as in CMake's default.
+set(CMAKE_CXX_FLAGS_RELEASE "-O3 -DNDEBUG")
+
+function(sgf_compile_options target)
+  # Same input, same bits: no contraction to fused multiply-add. errno and floating-point traps are
+  # never looked at, and both only block vectorisation; neither flag changes a value.
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -ffp-contract=off -fno-math-errno -fno-trapping-math
+    $<$<BOOL:${SGF_WARNINGS_AS_ERRORS}>:-Werror>
+    $<$<BOOL:${SGF_SANITIZE}>:-fsanitize=address,undefined -fno-omit-frame-pointer>)
+  target_link_options(${target} PRIVATE
+    $<$<BOOL:${SGF_SANITIZE}>:-fsanitize=address,undefined>)
+endfunction()
+
+# sgf_library(NAME SOURCES file... [DEPENDS target...] [PRIVATE_DEPENDS target...])
+# makes library sgf_NAME with the alias sgf::NAME from the calling folder and installs its headers.
+function(sgf_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  add_library(sgf_${name} STATIC ${ARG_SOURCES})
+  add_library(sgf::${name} ALIAS sgf_${name})
+  sgf_compile_options(sgf_${name})
+  target_include_directories(sgf_${name} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_compile_features(sgf_${name} PUBLIC cxx_std_20)
+  target_link_libraries(sgf_${name} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
+  set_target_properties(sgf_${name} PROPERTIES
+    EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  install(TARGETS sgf_${name} EXPORT sgf-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/"
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sgf/${name}
+    FILES_MATCHING PATTERN "*.h" PATTERN "*.inc")
+endfunction()
+
+# sgf_app(NAME SOURCES file... [DEPENDS target...]) makes and installs executable NAME.
+function(sgf_app name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  sgf_compile_options(${name})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS})
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endfunction()
+
+# sgf_test(NAME SOURCES file... [DEPENDS target...] [LABELS label...] [TIMEOUT seconds])
+# makes GoogleTest executable NAME and registers it with CTest as one test.
+function(sgf_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  if(NOT ARG_LABELS)
+    set(ARG_LABELS unit)
+  endif()
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 300)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  sgf_compile_options(${name})
+  target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests")
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} GTest::gtest GTest::gmock GTest::gtest_main)
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES LABELS "${ARG_LABELS}" TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# sgf_benchmark(NAME SOURCES file... [DEPENDS target...]) makes Google Benchmark executable NAME.
+function(sgf_benchmark name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  sgf_compile_options(${name})
+  target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} benchmark::benchmark)
+endfunction()

@@ -1,0 +1,43 @@
+#include <fmt/core.h>
+
+#include <array>
+#include <opencv2/imgproc.hpp>
+
+#include <sgf/core/error.h>
+#include <sgf/core/gradient.h>
+
+namespace sgf {
+
+std::span<const std::pair<const char*, GradientOperator>> EnumNames(GradientOperator) {
+  static constexpr std::array<std::pair<const char*, GradientOperator>, 2> kNames{
+      {{"central", GradientOperator::kCentral}, {"scharr", GradientOperator::kScharr}}};
+  return kNames;
+}
+
+void RequireGreyImage(const cv::Mat& image, const char* name) {
+  if (image.empty()) throw Error(name, "image is empty");
+  if (image.channels() != 1)
+    throw Error(name, fmt::format("expected one channel, got {}", image.channels()));
+  if (image.depth() != CV_8U && image.depth() != CV_16U && image.depth() != CV_32F)
+    throw Error(name, fmt::format("unsupported pixel type {}", cv::typeToString(image.type())));
+}
+
+GradientImage ComputeGradient(const cv::Mat& image, GradientOperator op) {
+  RequireGreyImage(image, "gradient input");
+  const cv::Matx13f derivative(-0.5F, 0, 0.5F);
+  const cv::Matx13f across = op == GradientOperator::kScharr
+                                 ? cv::Matx13f(3 / 16.F, 10 / 16.F, 3 / 16.F)
+                                 : cv::Matx13f(0, 1, 0);
+  GradientImage gradient;
+  const cv::Point centre(-1, -1);
+  cv::sepFilter2D(image, gradient.x, CV_32F, derivative, across, centre, 0, cv::BORDER_REPLICATE);
+  cv::sepFilter2D(image, gradient.y, CV_32F, across, derivative, centre, 0, cv::BORDER_REPLICATE);
+  return gradient;
+}
+
+double MeanSquaredGradient(const GradientImage& gradient) {
+  const double n = static_cast<double>(gradient.x.total());
+  return n == 0 ? 0 : (gradient.x.dot(gradient.x) + gradient.y.dot(gradient.y)) / n;
+}
+
+}  // namespace sgf
