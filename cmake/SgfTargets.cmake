@@ -26,20 +26,22 @@ function(sgf_compile_options target)
 endfunction()
 
 # sgf_library(NAME SOURCES file... [DEPENDS target...] [PRIVATE_DEPENDS target...])
-# makes library sgf_NAME with the alias sgf::NAME from the calling folder and installs its headers.
+# makes library libsgf_NAME, used as sgf::NAME, from the calling folder and installs its headers. (The
+# target's own name is another, since programs such as sgf_stereo are targets too.)
 function(sgf_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
-  add_library(sgf_${name} STATIC ${ARG_SOURCES})
-  add_library(sgf::${name} ALIAS sgf_${name})
-  sgf_compile_options(sgf_${name})
-  target_include_directories(sgf_${name} PUBLIC
+  set(target sgf_library_${name})
+  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(sgf::${name} ALIAS ${target})
+  sgf_compile_options(${target})
+  target_include_directories(${target} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/include>
     $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
-  target_compile_features(sgf_${name} PUBLIC cxx_std_20)
-  target_link_libraries(sgf_${name} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
-  set_target_properties(sgf_${name} PROPERTIES
-    EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
-  install(TARGETS sgf_${name} EXPORT sgf-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_link_libraries(${target} PUBLIC ${ARG_DEPENDS} PRIVATE ${ARG_PRIVATE_DEPENDS})
+  set_target_properties(${target} PROPERTIES
+    OUTPUT_NAME sgf_${name} EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  install(TARGETS ${target} EXPORT sgf-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/"
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sgf/${name}
     FILES_MATCHING PATTERN "*.h" PATTERN "*.inc")

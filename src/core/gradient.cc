@@ -30,8 +30,10 @@ GradientImage ComputeGradient(const cv::Mat& image, GradientOperator op) {
                                  : cv::Matx13f(0, 1, 0);
   GradientImage gradient;
   const cv::Point centre(-1, -1);
-  cv::sepFilter2D(image, gradient.x, CV_32F, derivative, across, centre, 0, cv::BORDER_REPLICATE);
-  cv::sepFilter2D(image, gradient.y, CV_32F, across, derivative, centre, 0, cv::BORDER_REPLICATE);
+  // Isolated: a part of a larger image is an image of its own.
+  constexpr int kBorder = cv::BORDER_REPLICATE | cv::BORDER_ISOLATED;
+  cv::sepFilter2D(image, gradient.x, CV_32F, derivative, across, centre, 0, kBorder);
+  cv::sepFilter2D(image, gradient.y, CV_32F, across, derivative, centre, 0, kBorder);
   return gradient;
 }
 

@@ -46,6 +46,16 @@ TEST(Gradient, OperatorsDifferWhereTheImageCurvesAcross) {
   EXPECT_FLOAT_EQ(ComputeGradient(image, GradientOperator::kScharr).x(1, 2), 9.375F);
 }
 
+TEST(Gradient, OfAPartOfAnImageDoesNotSeeTheRest) {
+  const cv::Mat1f image = Bilinear();
+  const cv::Mat part = image(cv::Rect(2, 1, 5, 4));
+  for (const auto op : {GradientOperator::kCentral, GradientOperator::kScharr}) {
+    const GradientImage seen = ComputeGradient(part, op), alone = ComputeGradient(part.clone(), op);
+    EXPECT_EQ(cv::norm(seen.x, alone.x, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(seen.y, alone.y, cv::NORM_INF), 0);
+  }
+}
+
 TEST(Gradient, MeanSquaredGradientIsEquation6) {
   const cv::Mat1f image = (cv::Mat1f(1, 3) << 0, 2, 4);
   // x derivatives 1, 2, 1; y derivatives 0.

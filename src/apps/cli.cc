@@ -1,0 +1,60 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+
+#include <sgf/apps/cli.h>
+
+namespace sgf::apps {
+
+int RunTool(CLI::App& app, int argc, char** argv, const std::function<void()>& body) {
+  constexpr int kBadInput = 2;
+  const auto report = [&](const char* what) { fmt::print(stderr, "{}: {}\n", app.get_name(), what); };
+  try {
+    app.parse(argc, argv);
+    body();
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kBadInput;
+  } catch (const Error& error) {
+    report(error.what());
+    return kBadInput;
+  } catch (const std::exception& error) {
+    report(error.what());
+    return 1;
+  }
+}
+
+YAML::Node LoadYamlFile(const std::string& path) {
+  try {
+    return YAML::LoadFile(path);
+  } catch (const YAML::BadFile&) {
+    throw Error(path, "cannot be opened");
+  } catch (const YAML::Exception& error) {
+    throw Error(fmt::format("{}:{}", path, error.mark.line + 1), error.msg);
+  }
+}
+
+void OptionFlags::Add(CLI::App& app, const OptionDoc& doc,
+                      const std::map<std::string, std::string>& renamed) {
+  std::string flag = "--" + doc.name;
+  std::replace(flag.begin(), flag.end(), '_', '-');
+  if (const auto it = renamed.find(doc.name); it != renamed.end()) flag += "," + it->second;
+  const std::string unit = doc.unit.empty() ? "" : ", " + doc.unit;
+  const std::string text = fmt::format("{} (default {}{})", doc.text, doc.default_value, unit);
+  app.add_option_function<std::string>(
+      flag,
+      [this, name = doc.name](const std::string& value) {
+        YAML::Node map = flags_;
+        size_t begin = 0;
+        for (size_t dot; (dot = name.find('.', begin)) != std::string::npos; begin = dot + 1)
+          map.reset(map[name.substr(begin, dot - begin)]);
+        map[name.substr(begin)] = value;
+      },
+      text);
+}
+
+YAML::Node OptionFlags::LoadConfig() const { return LoadYamlFile(config_); }
+
+}  // namespace sgf::apps

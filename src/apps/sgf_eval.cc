@@ -1,0 +1,74 @@
+// Runs experiments over datasets and writes their raw scores.
+
+#include <fmt/core.h>
+
+#include <sgf/apps/cli.h>
+#include <sgf/apps/stereo_sweep.h>
+#include <sgf/io/catalogue.h>
+#include <sgf/io/stereo_dataset.h>
+
+namespace sgf::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DataArguments {
+  std::string catalogue = "datasets/catalogue.yaml";
+  std::string data;
+  std::string generated = "datasets/generated";
+};
+
+void AddDataArguments(CLI::App& app, DataArguments& data) {
+  app.add_option("--catalogue", data.catalogue, "list of known datasets")->capture_default_str();
+  app.add_option("--data", data.data, "folder with downloaded datasets")->envname("SGF_DATA");
+  app.add_option("--generated", data.generated, "folder with datasets made from packages")->capture_default_str();
+}
+
+std::optional<fs::path> Find(const CatalogueEntry& entry, const DataArguments& data) {
+  const std::string& root = entry.generated ? data.generated : data.data;
+  return root.empty() ? std::nullopt : FindDataset(entry, root);
+}
+
+void ListDatasets(const DataArguments& data) {
+  for (const CatalogueEntry& entry : ReadCatalogue(data.catalogue))
+    if (const auto folder = Find(entry, data))
+      fmt::print("{}\t{}\t{}\n", entry.name, folder->string(), ListStereoScenes(*folder, entry.layout).size());
+}
+
+void SweepDataset(const DataArguments& data, const StereoSweepRequest& request) {
+  for (const CatalogueEntry& entry : ReadCatalogue(data.catalogue)) {
+    if (entry.name != request.dataset) continue;
+    const auto folder = Find(entry, data);
+    if (!folder) throw Error(request.dataset, "is not in the data folders");
+    return RunStereoSweep(request, entry, *folder);
+  }
+  throw Error(data.catalogue, fmt::format("has no dataset '{}'", request.dataset));
+}
+
+}  // namespace
+}  // namespace sgf::apps
+
+int main(int argc, char** argv) {
+  using namespace sgf;
+  CLI::App app("Runs experiments over datasets and writes their raw scores.", "sgf_eval");
+  app.require_subcommand(1);
+  apps::DataArguments data;
+  apps::StereoSweepRequest request;
+
+  CLI::App* datasets = app.add_subcommand("datasets", "print name, folder and number of scenes of the datasets at hand");
+  apps::AddDataArguments(*datasets, data);
+
+  CLI::App* stereo = app.add_subcommand("stereo", "score one column of a stereo sweep on all scenes of a dataset");
+  apps::AddDataArguments(*stereo, data);
+  stereo->add_option("--experiment", request.experiment, "YAML file of the sweep")->required();
+  stereo->add_option("--dataset", request.dataset, "name in the catalogue")->required();
+  stereo->add_option("--column", request.column, "name in the sweep")->required();
+  stereo->add_option("--out", request.output, "CSV file to write")->required();
+  stereo->add_option("--options-out", request.options_output, "YAML file for every parameter");
+  stereo->add_option("--threads", request.threads, "threads; 0 for all cores")->capture_default_str();
+
+  return apps::RunTool(app, argc, argv, [&] {
+    if (*datasets) apps::ListDatasets(data);
+    if (*stereo) apps::SweepDataset(data, request);
+  });
+}

@@ -1,0 +1,329 @@
+// The row kernels of block matching, compiled once per instruction set by Highway.
+//
+// A band is processed row by row. When an image row enters, every left column x updates its column
+// sums V[x][d] over the window's rows, and the window sum slides along x:
+// H[x][d] = H[x-1][d] + V[x+r][d] - V[x-r-1][d]. Lanes run along d. The costs of the last `window`
+// rows stay in a ring so that they can be taken off when they leave. All sums are exact integers, so
+// nothing depends on how rows are split into bands.
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sgf/stereo/band.cc"
+#include <hwy/foreach_target.h>
+// foreach_target.h has to come first.
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+
+#include <sgf/stereo/band.h>
+#include <sgf/stereo/sgf_rows-inl.h>
+#include <sgf/stereo/winners-inl.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace sgf::stereo::internal {
+namespace HWY_NAMESPACE {
+
+// Source of costs for BandMatcher: rows that are made elsewhere.
+class RowSource {
+ public:
+  using Sum = int32_t;
+  using Cost = uint16_t;
+  using D = hn::ScalableTag<Sum>;
+
+  RowSource(const BandTask& task, CostRows& rows, int stride)
+      : rows_(rows), stride_(stride), size_(static_cast<size_t>(task.width) * stride),
+        costs_(hwy::AllocateAligned<Cost>(size_)) {
+    std::fill_n(costs_.get(), size_, Cost{0});
+  }
+
+  void StartRow(int y) { rows_.Row(y, stride_, costs_.get()); }
+
+  struct Column {
+    const Cost* costs;
+    HWY_INLINE hn::Vec<D> operator()(D d, int k) const {
+      return hn::PromoteTo(d, hn::Load(hn::Rebind<Cost, D>(), costs + k));
+    }
+  };
+  HWY_INLINE Column At(int x) const { return {costs_.get() + static_cast<size_t>(x) * stride_}; }
+
+ private:
+  CostRows& rows_;
+  int stride_;
+  size_t size_;
+  hwy::AlignedFreeUniquePtr<Cost[]> costs_;
+};
+
+template <class Source>
+class BandMatcher {
+ public:
+  BandMatcher(const BandTask& task, int stride, Source& source)
+      : task_(task), source_(source), radius_(task.window / 2), stride_(stride),
+        whole_(task.num_disparities / LanesOf<Sum>() * LanesOf<Sum>()),
+        finder_(task, stride), right_view_(task, stride) {
+    const size_t row = static_cast<size_t>(task.width) * stride;
+    ring_ = Filled<Cost>(task.window * row, 0);
+    column_sums_ = Filled<Sum>((task.width + 2 * radius_ + 1) * static_cast<size_t>(stride), 0);
+    // Columns run from -radius - 1 to width + radius - 1; those outside the image stay zero.
+    column_zero_ = column_sums_.get() + static_cast<size_t>(radius_ + 1) * stride;
+    full_reach_ = stride + task.min_disparity - radius_;
+    window_sums_ = Filled<Sum>(2 * kPixels * (static_cast<size_t>(stride) + 2 * kGuard), kMax);
+    wanted_ = Filled<Sum>(stride, 0);
+    std::fill_n(wanted_.get(), task.num_disparities, Sum{-1});
+    index_ = Filled<Sum>(stride, 0);
+    std::iota(index_.get(), index_.get() + stride, Sum{0});
+  }
+
+  void Run() {
+    for (int y = task_.y_begin - radius_; y < task_.y_end + radius_; ++y) {
+      const int slot = (y + task_.window) % task_.window;
+      ring_row_ = ring_.get() + static_cast<size_t>(slot) * task_.width * stride_;
+      if (y >= 0 && y < task_.height) {
+        source_.StartRow(y);
+        EnterRow<true>(y - radius_);
+      } else {
+        EnterRow<false>(y - radius_);
+      }
+    }
+  }
+
+ private:
+  using Sum = typename Source::Sum;
+  using Cost = typename Source::Cost;
+  using D = hn::ScalableTag<Sum>;
+  using V = hn::Vec<D>;
+  static constexpr Sum kMax = SumTraits<Sum>::kMax;
+  // kMax around every row of window sums: enough for a vector and the pixels of a block, and a
+  // multiple of any vector so that rows stay aligned.
+  static constexpr int kGuard = std::max<int>(64, 2 * HWY_MAX_BYTES / sizeof(Sum));
+
+  template <class T>
+  static hwy::AlignedFreeUniquePtr<T[]> Filled(size_t size, T value) {
+    auto values = hwy::AllocateAligned<T>(size);
+    std::fill_n(values.get(), size, value);
+    return values;
+  }
+
+  // The sums of pixel slot p, between guards; slots from kPixels on hold masked copies.
+  Sum* Window(int p) {
+    return window_sums_.get() + kGuard + static_cast<size_t>(p) * (stride_ + 2 * kGuard);
+  }
+
+  // Adds the entering row's costs to a vector of column sums and takes the leaving row's off.
+  template <bool kInside, bool kPadded, class Column>
+  HWY_INLINE V UpdateColumn(const Column& column, int k, Cost* ring, Sum* sums) const {
+    const D d;
+    const hn::Rebind<Cost, D> d_cost;
+    const auto leaving = hn::PromoteTo(d, hn::Load(d_cost, ring + k));
+    auto cost = hn::Zero(d);
+    if constexpr (kInside) cost = column(d, k);
+    // Lanes past the last disparity cost nothing, so that their window sums stay at kMax.
+    if constexpr (kInside && kPadded) cost = hn::And(cost, hn::Load(d, wanted_.get() + k));
+    hn::Store(hn::DemoteTo(d_cost, cost), d_cost, ring + k);
+    const auto sum = hn::Sub(hn::Add(hn::Load(d, sums + k), cost), leaving);
+    hn::Store(sum, d, sums + k);
+    return sum;
+  }
+
+  // Updates the sums of column x and passes each vector on: use(k, sums).
+  template <bool kInside, class Use>
+  HWY_INLINE void EnterColumn(int x, Use use) {
+    if (x < 0 || x >= task_.width) {
+      for (int k = 0; k < stride_; k += LanesOf<Sum>()) use(k, hn::Zero(D()));
+      return;
+    }
+    const ptrdiff_t at = static_cast<ptrdiff_t>(x) * stride_;
+    Cost* ring = ring_row_ + at;
+    Sum* sums = column_zero_ + at;
+    const auto column = source_.At(x);
+    const int end = x < full_reach_ ? Reach(x) : stride_;
+    const int whole = std::min(whole_, end);
+#pragma GCC unroll 2
+    for (int k = 0; k < whole; k += LanesOf<Sum>())
+      use(k, UpdateColumn<kInside, false>(column, k, ring, sums));
+    if (whole_ < end) use(whole_, UpdateColumn<kInside, true>(column, whole_, ring, sums));
+  }
+
+  // Disparity indices below this, in whole vectors, are candidates of some window that holds column
+  // x; the column sums of the others are never looked at and stay zero.
+  int Reach(int x) const {
+    const int needed = std::max(1, x + radius_ - task_.min_disparity + 1);
+    return needed >= stride_ ? stride_ : static_cast<int>(hwy::RoundUpTo(needed, LanesOf<Sum>()));
+  }
+
+  template <bool kInside>
+  void EnterRow(int y) {
+    if (y < task_.y_begin) {
+      for (int x = 0; x < task_.width; ++x) EnterColumn<kInside>(x, [](int, V) {});
+      return;
+    }
+    StartWindows<kInside>();
+    if (right_view_.Enabled()) right_view_.StartRow();
+    for (int x = 0; x < task_.width; x += kPixels) {
+      const int count = std::min(kPixels, task_.width - x);
+      SlideWindows<kInside>(x, count);
+      TakeWinners(x, y, count);
+    }
+    if (right_view_.Enabled()) right_view_.Check((*task_.disparity)[y], Invalid());
+  }
+
+  // Window sums at x = -1, in the slot from which the first pixel slides on. The other slots start
+  // empty too, since sliding leaves out what no column reaches yet.
+  template <bool kInside>
+  void StartWindows() {
+    const D d;
+    for (int p = 0; p < kPixels; ++p) {
+      std::fill_n(Window(p), task_.num_disparities, SumTraits<Sum>::kOffset);
+      std::fill(Window(p) + task_.num_disparities, Window(p) + stride_, kMax);
+    }
+    Sum* window = Window(kPixels - 1);
+    for (int x = 0; x < radius_; ++x)
+      EnterColumn<kInside>(x, [&](int k, V sums) HWY_ATTR {
+        hn::Store(hn::Add(hn::Load(d, window + k), sums), d, window + k);
+      });
+  }
+
+  // Window sums of `count` pixels from x on, and the lane-wise minimum of each.
+  template <bool kInside>
+  HWY_INLINE void SlideWindows(int x, int count) {
+    const D d;
+    const Sum* previous = Window(kPixels - 1);
+    Sum* window = Window(0);
+    const Sum* leaving = column_zero_ + static_cast<ptrdiff_t>(x - radius_ - 1) * stride_;
+    for (int p = 0; p < count; ++p) {
+      auto least = hn::Set(d, kMax);
+      EnterColumn<kInside>(x + p + radius_, [&](int k, V entering) HWY_ATTR {
+        const auto change = hn::Sub(entering, hn::Load(d, leaving + k));
+        const auto sum = hn::Add(hn::Load(d, previous + k), change);
+        hn::Store(sum, d, window + k);
+        least = hn::Min(least, sum);
+      });
+      hn::Store(least, d, finder_.Least(p));
+      previous = window;
+      window += stride_ + 2 * kGuard;
+      leaving += stride_;
+    }
+  }
+
+  // The sums of `count` pixels from x on over their candidates. All slots are set.
+  HWY_INLINE std::array<const Sum*, kPixels> Candidates(int x, int count) {
+    std::array<const Sum*, kPixels> sums;
+    for (int p = 0; p < kPixels; ++p) sums[p] = Window(p);
+    if (x < task_.num_disparities - 1 + task_.min_disparity ||
+        x + count > task_.width + task_.min_disparity)
+      for (int p = 0; p < count; ++p) sums[p] = MaskedCopy(x + p, p);
+    return sums;
+  }
+
+  // The sums of pixel x with those kMax whose disparity leaves the right image, and their least. A
+  // copy, since the window sums themselves slide on.
+  const Sum* MaskedCopy(int x, int p) {
+    const int first = std::max(0, x - task_.min_disparity - (task_.width - 1));
+    const int end = std::min(task_.num_disparities, x - task_.min_disparity + 1);
+    const D d;
+    const auto none = hn::Set(d, kMax);
+    const auto low = hn::Set(d, static_cast<Sum>(first));
+    const auto high = hn::Set(d, static_cast<Sum>(std::max(end, 0) - 1));
+    Sum* copy = Window(kPixels + p);
+    auto least = none;
+    for (int k = 0; k < stride_; k += LanesOf<Sum>()) {
+      const auto index = hn::Load(d, index_.get() + k);
+      const auto out = hn::Or(hn::Gt(low, index), hn::Gt(index, high));
+      const auto sums = hn::IfThenElse(out, none, hn::Load(d, Window(p) + k));
+      hn::Store(sums, d, copy + k);
+      least = hn::Min(least, sums);
+    }
+    hn::Store(least, d, finder_.Least(p));
+    return copy;
+  }
+
+  void TakeWinners(int x, int y, int count) {
+    const std::array<const Sum*, kPixels> sums = Candidates(x, count);
+    Winners<Sum> winners;
+    finder_.Find(sums, count, winners);
+    int16_t* disparity = (*task_.disparity)[y] + x;
+    for (int p = 0; p < count; ++p)
+      disparity[p] = winners.accepted[p]
+                         ? static_cast<int16_t>(16 * task_.min_disparity + winners.sixteenths[p])
+                         : Invalid();
+    if (right_view_.Enabled()) right_view_.Add(x, count, sums, winners);
+    if (task_.best)
+      for (int p = 0; p < count; ++p)
+        if (winners.accepted[p]) KeepCosts(x + p, y, sums[p], winners.index[p]);
+  }
+
+  // The winner's sum and the least one that is neither its own nor a neighbour's.
+  void KeepCosts(int x, int y, const Sum* sums, int index) {
+    Sum second = kMax;
+    for (int k = 0; k < task_.num_disparities; ++k)
+      if (std::abs(k - index) > 1) second = std::min(second, sums[k]);
+    (*task_.best)(y, x) = sums[index] - SumTraits<Sum>::kOffset;
+    (*task_.second)(y, x) = second == kMax ? kNoSecond : second - SumTraits<Sum>::kOffset;
+  }
+
+  int16_t Invalid() const { return static_cast<int16_t>(16 * (task_.min_disparity - 1)); }
+
+  const BandTask& task_;
+  Source& source_;
+  int radius_, stride_;
+  int whole_;       // disparity indices in vectors that hold no padding
+  int full_reach_;  // first column all of whose sums are needed
+  WinnerFinder<Sum> finder_;
+  RightView<Sum> right_view_;
+  hwy::AlignedFreeUniquePtr<Cost[]> ring_;
+  hwy::AlignedFreeUniquePtr<Sum[]> column_sums_, window_sums_, wanted_, index_;
+  Cost* ring_row_ = nullptr;
+  Sum* column_zero_;
+};
+
+template <class Sum>
+int Stride(const BandTask& task) {
+  return static_cast<int>(hwy::RoundUpTo(task.num_disparities, LanesOf<Sum>()));
+}
+
+void SgfBand(const BandTask& task, const SgfImage& left, const SgfImage& right) {
+  const int stride = Stride<SgfSource::Sum>(task);
+  SgfSource source(task, left, right, stride);
+  BandMatcher<SgfSource>(task, stride, source).Run();
+}
+
+void CostBand(const BandTask& task, CostRows& costs) {
+  const int stride = Stride<RowSource::Sum>(task);
+  RowSource source(task, costs, stride);
+  BandMatcher<RowSource>(task, stride, source).Run();
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace sgf::stereo::internal
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace sgf::stereo::internal {
+
+HWY_EXPORT(SumSquaredGradient);
+HWY_EXPORT(SgfBand);
+HWY_EXPORT(CostBand);
+
+int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begin, int end) {
+  return HWY_DYNAMIC_DISPATCH(SumSquaredGradient)(image, op, begin, end);
+}
+
+void MatchSgfBand(const BandTask& task, const SgfImage& left, const SgfImage& right) {
+  HWY_DYNAMIC_DISPATCH(SgfBand)(task, left, right);
+}
+
+void MatchCostBand(const BandTask& task, CostRows& costs) {
+  HWY_DYNAMIC_DISPATCH(CostBand)(task, costs);
+}
+
+int SgfCostScale(int window) {
+  // 8 bits would hold twice this. But r = scale / max(||a||^2, tau) saturates at 2^15 - 1, so that tau
+  // is at least scale / 32767: half the resolution of a cost buys half the tau, and weak gradients
+  // tell more than the last bit of a strong one's cost.
+  constexpr int kLargest = 63;
+  // Rounding can take a cost two past its range [0, 2 scale].
+  return std::min(kLargest, 65534 / (2 * window * window) - 1);
+}
+
+}  // namespace sgf::stereo::internal
+#endif  // HWY_ONCE

@@ -1,0 +1,66 @@
+#pragma once
+
+// Internal to sgf::stereo: what the row kernels of band.cc work on.
+
+#include <cstdint>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include <sgf/core/gradient.h>
+#include <sgf/stereo/block_matcher.h>
+
+namespace sgf::stereo::internal {
+
+/// One band of output rows and what is wanted of them.
+struct BandTask {
+  int width, height;                     ///< of the images, px
+  int y_begin, y_end;                    ///< rows to write
+  int min_disparity, num_disparities;    ///< px
+  int window;                            ///< px, odd
+  int uniqueness_q16;                    ///< required margin over the winner's cost * 2^16; 0 is off
+  Subpixel subpixel;
+  int left_right_max;                    ///< px; negative is off
+  cv::Mat1s* disparity;                  ///< output, 1/16 px
+  cv::Mat1i* best;                       ///< output or null
+  cv::Mat1i* second;                     ///< output or null
+};
+
+/// Costs of one image row against all disparities, for dissimilarities other than fixed-point sgf.
+/// One object serves one band and is asked for rows in increasing order.
+class CostRows {
+ public:
+  virtual ~CostRows() = default;
+
+  /// Writes costs[x * stride + d] for x in [0, width), d in [0, num_disparities).
+  virtual void Row(int y, int stride, uint16_t* costs) = 0;
+};
+
+/// Stands in Matches::second where a pixel has no such candidate.
+constexpr int kNoSecond = std::numeric_limits<int>::max();
+
+/// An image prepared for fixed-point sgf: its 8-bit pixels or, for other inputs, its gradient; and
+/// epsilon as one number or a map.
+struct SgfImage {
+  cv::Mat1b pixels;        ///< of 8-bit images; empty for others
+  GradientOperator op;     ///< taken of the pixels
+  GradientImage gradient;  ///< used where `pixels` is empty
+  cv::Mat1f epsilon;       ///< 1 x 1, or one value a pixel, (grey levels/px)^2
+  float tau;
+};
+
+/// Largest cost scale s for which a window's sum of costs, each at most 2 s, fits 16 bits and a cost
+/// fits 8; a dissimilarity of 1 becomes the cost s.
+int SgfCostScale(int window);
+
+/// Sum over rows [begin, end) of squared gradient magnitudes of an 8-bit image, exact in units of
+/// (1/32 grey level/px)^2.
+int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begin, int end);
+
+/// Matches a band on sgf in 16-bit fixed point (sgf.inc on int16 lanes).
+void MatchSgfBand(const BandTask& task, const SgfImage& left, const SgfImage& right);
+
+/// Matches a band on any other cost.
+void MatchCostBand(const BandTask& task, CostRows& costs);
+
+}  // namespace sgf::stereo::internal

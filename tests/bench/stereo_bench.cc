@@ -1,0 +1,148 @@
+// Throughput of block matching on sgf, gradients included, against cv::StereoBM with its prefilter:
+// the same pair, disparities, window and filters (uniqueness only).
+//
+// SGF_BENCH_PAIR names a folder with im0.png and im1.png. Benchmarks are called
+// case/implementation/isa/threads; mde_per_s is width * height * disparities / 10^6 a second,
+// peak_mib the memory that one call takes beyond what the process held before.
+
+#include <benchmark/benchmark.h>
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <sgf/core/error.h>
+#include <sgf/core/simd.h>
+#include <sgf/io/image.h>
+#include <sgf/stereo/stereo_sgf.h>
+
+namespace sgf {
+namespace {
+
+constexpr int kWindow = 9;
+constexpr int kUniqueness = 15;  // OpenCV's default
+
+struct Case {
+  std::string name;
+  cv::Mat1b left, right;
+  int disparities;
+};
+
+Case MakeCase(const cv::Mat1b& left, const cv::Mat1b& right, cv::Size size, int disparities) {
+  Case c{fmt::format("motorcycle_{}x{}", size.width, size.height), left, right, disparities};
+  if (size != left.size()) {
+    cv::resize(left, c.left, size, 0, 0, cv::INTER_CUBIC);
+    cv::resize(right, c.right, size, 0, 0, cv::INTER_CUBIC);
+  }
+  return c;
+}
+
+// A value of /proc/self/status in MiB.
+double StatusMib(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;)
+    if (word == key + ":") {
+      double kib = 0;
+      status >> kib;
+      return kib / 1024;
+    }
+  return 0;
+}
+
+// Memory that a call needs at its peak; 0 where the kernel does not let the peak be reset.
+double PeakMib(const std::function<void()>& call) {
+  std::ofstream reset("/proc/self/clear_refs");
+  if (!(reset << 5 << std::flush)) return 0;
+  const double before = StatusMib("VmRSS");
+  call();
+  return StatusMib("VmHWM") - before;
+}
+
+void Measure(benchmark::State& state, const Case& c, const std::function<void()>& match) {
+  state.counters["peak_mib"] = PeakMib(match);
+  for (auto _ : state) match();
+  const double evaluations = static_cast<double>(c.left.total()) * c.disparities / 1e6;
+  state.counters["mde_per_s"] =
+      benchmark::Counter(evaluations * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+}
+
+void OpenCvBm(benchmark::State& state, const Case& c, int threads) {
+  cv::setNumThreads(threads);
+  const auto matcher = cv::StereoBM::create(c.disparities, kWindow);
+  matcher->setTextureThreshold(0);
+  matcher->setUniquenessRatio(kUniqueness);
+  Measure(state, c, [&] {
+    cv::Mat disparity;
+    matcher->compute(c.left, c.right, disparity);
+    benchmark::DoNotOptimize(disparity.data);
+  });
+}
+
+void SgfBm(benchmark::State& state, const Case& c, const std::string& isa, int threads) {
+  cv::setNumThreads(1);
+  RestrictSimd(isa);
+  const auto matcher = StereoSgf::create(c.disparities, kWindow);
+  matcher->setUniquenessRatio(kUniqueness);
+  matcher->setDisp12MaxDiff(-1);
+  matcher->setThreads(threads);
+  Measure(state, c, [&] {
+    cv::Mat disparity;
+    matcher->compute(c.left, c.right, disparity);
+    benchmark::DoNotOptimize(disparity.data);
+  });
+  RestrictSimd("");
+}
+
+template <class Run>
+void Register(const Case& c, const char* implementation, const std::string& isa, int threads, Run run) {
+  const std::string name = fmt::format("{}/{}/{}/{}", c.name, implementation, isa, threads);
+  benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseRealTime();
+}
+
+void RegisterCase(const Case& c) {
+  for (const int threads : {1, 2})
+    Register(c, "opencv_bm", "own", threads, [&c, threads](benchmark::State& state) { OpenCvBm(state, c, threads); });
+  const auto targets = SimdTargets();
+  for (const std::string& isa : targets) {
+    if (isa == "scalar") continue;
+    for (const int threads : {1, 2})
+      if (threads == 1 || isa == targets.front())
+        Register(c, "sgf_bm", isa, threads,
+                 [&c, isa, threads](benchmark::State& state) { SgfBm(state, c, isa, threads); });
+  }
+}
+
+int Run(int argc, char** argv) {
+  const char* folder = std::getenv("SGF_BENCH_PAIR");
+  if (!folder) throw Error("SGF_BENCH_PAIR", "is not set: name a folder with im0.png and im1.png");
+  const cv::Mat1b left = ReadGrey(std::filesystem::path(folder) / "im0.png");
+  const cv::Mat1b right = ReadGrey(std::filesystem::path(folder) / "im1.png");
+  const std::vector<Case> cases{MakeCase(left, right, left.size(), 128),
+                                MakeCase(left, right, left.size() * 2, 256)};
+  for (const Case& c : cases) RegisterCase(c);
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
+
+}  // namespace
+}  // namespace sgf
+
+int main(int argc, char** argv) {
+  try {
+    return sgf::Run(argc, argv);
+  } catch (const sgf::Error& error) {
+    std::cerr << "stereo_bench: " << error.what() << '\n';
+    return 2;
+  }
+}
