@@ -1,8 +1,8 @@
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+
+#include <fmt/core.h>
 
 #include <sgf/apps/cli.h>
 
@@ -10,7 +10,9 @@ namespace sgf::apps {
 
 int RunTool(CLI::App& app, int argc, char** argv, const std::function<void()>& body) {
   constexpr int kBadInput = 2;
-  const auto report = [&](const char* what) { fmt::print(stderr, "{}: {}\n", app.get_name(), what); };
+  const auto report = [&](const char* what) {
+    fmt::print(stderr, "{}: {}\n", app.get_name(), what);
+  };
   try {
     app.parse(argc, argv);
     body();

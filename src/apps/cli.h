@@ -1,9 +1,10 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <map>
 #include <string>
+
+#include <CLI/CLI.hpp>
 
 #include <sgf/core/options.h>
 

@@ -21,7 +21,8 @@ struct DataArguments {
 void AddDataArguments(CLI::App& app, DataArguments& data) {
   app.add_option("--catalogue", data.catalogue, "list of known datasets")->capture_default_str();
   app.add_option("--data", data.data, "folder with downloaded datasets")->envname("SGF_DATA");
-  app.add_option("--generated", data.generated, "folder with datasets made from packages")->capture_default_str();
+  app.add_option("--generated", data.generated, "folder with datasets made from packages")
+      ->capture_default_str();
 }
 
 std::optional<fs::path> Find(const CatalogueEntry& entry, const DataArguments& data) {
@@ -32,7 +33,8 @@ std::optional<fs::path> Find(const CatalogueEntry& entry, const DataArguments& d
 void ListDatasets(const DataArguments& data) {
   for (const CatalogueEntry& entry : ReadCatalogue(data.catalogue))
     if (const auto folder = Find(entry, data))
-      fmt::print("{}\t{}\t{}\n", entry.name, folder->string(), ListStereoScenes(*folder, entry.layout).size());
+      fmt::print("{}\t{}\t{}\n", entry.name, folder->string(),
+                 ListStereoScenes(*folder, entry.layout).size());
 }
 
 void SweepDataset(const DataArguments& data, const StereoSweepRequest& request) {
@@ -55,17 +57,20 @@ int main(int argc, char** argv) {
   apps::DataArguments data;
   apps::StereoSweepRequest request;
 
-  CLI::App* datasets = app.add_subcommand("datasets", "print name, folder and number of scenes of the datasets at hand");
+  CLI::App* datasets = app.add_subcommand(
+      "datasets", "print name, folder and number of scenes of the datasets at hand");
   apps::AddDataArguments(*datasets, data);
 
-  CLI::App* stereo = app.add_subcommand("stereo", "score one column of a stereo sweep on all scenes of a dataset");
+  CLI::App* stereo =
+      app.add_subcommand("stereo", "score one column of a stereo sweep on all scenes of a dataset");
   apps::AddDataArguments(*stereo, data);
   stereo->add_option("--experiment", request.experiment, "YAML file of the sweep")->required();
   stereo->add_option("--dataset", request.dataset, "name in the catalogue")->required();
   stereo->add_option("--column", request.column, "name in the sweep")->required();
   stereo->add_option("--out", request.output, "CSV file to write")->required();
   stereo->add_option("--options-out", request.options_output, "YAML file for every parameter");
-  stereo->add_option("--threads", request.threads, "threads; 0 for all cores")->capture_default_str();
+  stereo->add_option("--threads", request.threads, "threads; 0 for all cores")
+      ->capture_default_str();
 
   return apps::RunTool(app, argc, argv, [&] {
     if (*datasets) apps::ListDatasets(data);

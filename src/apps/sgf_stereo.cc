@@ -1,11 +1,11 @@
 // Stereo matching of one rectified pair, or of all pairs of a dataset folder.
 
-#include <fmt/core.h>
-#include <spdlog/spdlog.h>
-
 #include <filesystem>
+
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
+#include <spdlog/spdlog.h>
 
 #include <sgf/apps/cli.h>
 #include <sgf/apps/stereo_method.h>
@@ -61,10 +61,10 @@ cv::Mat Colour(const cv::Mat1f& disparity, const stereo::BlockMatcherOptions& op
 }
 
 nlohmann::json ToJson(const DisparityScores& scores) {
-  return {{"truth_px", scores.truth_px},     {"matched_px", scores.matched_px},
-          {"mean_px", scores.mean_px},       {"bad1_pct", scores.bad1_pct},
-          {"bad2_pct", scores.bad2_pct},     {"bad4_pct", scores.bad4_pct},
-          {"d1_pct", scores.d1_pct},         {"invalid_pct", scores.invalid_pct}};
+  return {{"truth_px", scores.truth_px}, {"matched_px", scores.matched_px},
+          {"mean_px", scores.mean_px},   {"bad1_pct", scores.bad1_pct},
+          {"bad2_pct", scores.bad2_pct}, {"bad4_pct", scores.bad4_pct},
+          {"d1_pct", scores.d1_pct},     {"invalid_pct", scores.invalid_pct}};
 }
 
 void WriteDisparity(const fs::path& folder, const cv::Mat1f& disparity,
@@ -74,7 +74,8 @@ void WriteDisparity(const fs::path& folder, const cv::Mat1f& disparity,
   if (options.min_disparity >= 0 && largest <= kMaxDisparityPng16)
     WriteDisparityPng16(folder / "disparity.png", disparity);
   else
-    spdlog::warn("no 16-bit PNG: it cannot hold disparities from {} to {} px", options.min_disparity, largest);
+    spdlog::warn("no 16-bit PNG: it cannot hold disparities from {} to {} px",
+                 options.min_disparity, largest);
   WritePng(folder / "colour.png", Colour(disparity, options));
 }
 
@@ -107,23 +108,18 @@ void MatchPair(const Arguments& arguments, const stereo::BlockMatcherOptions& op
   if (scores.empty()) return;
   WriteText(folder / "scores.json", scores.dump(2) + "\n");
   for (const auto& [region, s] : scores.items())
-    fmt::print("{}: {} mean {:.3f} px, bad1 {:.2f} %, bad2 {:.2f} %, bad4 {:.2f} %, invalid {:.2f} %\n",
-               folder.string(), region, s["mean_px"].get<double>(), s["bad1_pct"].get<double>(),
-               s["bad2_pct"].get<double>(), s["bad4_pct"].get<double>(), s["invalid_pct"].get<double>());
+    fmt::print(
+        "{}: {} mean {:.3f} px, bad1 {:.2f} %, bad2 {:.2f} %, bad4 {:.2f} %, invalid {:.2f} %\n",
+        folder.string(), region, s["mean_px"].get<double>(), s["bad1_pct"].get<double>(),
+        s["bad2_pct"].get<double>(), s["bad4_pct"].get<double>(), s["invalid_pct"].get<double>());
 }
 
 void MatchFiles(const Arguments& arguments, const stereo::BlockMatcherOptions& options) {
   std::map<std::string, cv::Mat1f> truths;
-  if (!arguments.truth.empty()) truths["all"] = ReadDisparity(arguments.truth, arguments.truth_scale);
-  MatchPair(arguments, options, ReadGrey(arguments.inputs[0]), ReadGrey(arguments.inputs[1]), truths,
-            arguments.output);
-}
-
-cv::Mat1b Grey(const cv::Mat& image) {
-  if (image.channels() == 1) return image;
-  cv::Mat1b grey;
-  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  return grey;
+  if (!arguments.truth.empty())
+    truths["all"] = ReadDisparity(arguments.truth, arguments.truth_scale);
+  MatchPair(arguments, options, ReadGrey(arguments.inputs[0]), ReadGrey(arguments.inputs[1]),
+            truths, arguments.output);
 }
 
 void MatchFolder(const Arguments& arguments, stereo::BlockMatcherOptions options) {
@@ -133,8 +129,9 @@ void MatchFolder(const Arguments& arguments, stereo::BlockMatcherOptions options
   for (const StereoScene& scene : ListStereoScenes(arguments.inputs[0], layout)) {
     const StereoPair pair = LoadStereoScene(scene);
     options.num_disparities = pair.num_disparities > 0 ? pair.num_disparities : default_disparities;
-    MatchPair(arguments, options, Grey(pair.left), Grey(pair.right),
-              {{"all", pair.truth_all}, {"noc", pair.truth_noc}}, fs::path(arguments.output) / pair.name);
+    MatchPair(arguments, options, ToGrey(pair.left), ToGrey(pair.right),
+              {{"all", pair.truth_all}, {"noc", pair.truth_noc}},
+              fs::path(arguments.output) / pair.name);
   }
 }
 
@@ -142,7 +139,8 @@ void Run(const Arguments& arguments, const OptionFlags& flags) {
   if (arguments.list_metrics) return ListMetrics();
   if (arguments.inputs.empty() || arguments.inputs.size() > 2)
     throw Error("", "expected a left and a right image, or one dataset folder; see --help");
-  if (arguments.output.empty()) throw Error("--output", "is missing: name a folder for the results");
+  if (arguments.output.empty())
+    throw Error("--output", "is missing: name a folder for the results");
   stereo::BlockMatcherOptions options;
   options.threads = 0;
   flags.Apply(options);
@@ -159,20 +157,26 @@ void Run(const Arguments& arguments, const OptionFlags& flags) {
 int main(int argc, char** argv) {
   using namespace sgf;
   apps::Arguments arguments;
-  CLI::App app("Matches a rectified stereo pair, or every pair of a dataset folder: writes "
-               "disparity.pfm, disparity.png (16 bit, 256 levels a pixel), colour.png, options.yaml "
-               "and, with ground truth, scores.json.",
-               "sgf_stereo");
+  CLI::App app(
+      "Matches a rectified stereo pair, or every pair of a dataset folder: writes "
+      "disparity.pfm, disparity.png (16 bit, 256 levels a pixel), colour.png, options.yaml "
+      "and, with ground truth, scores.json.",
+      "sgf_stereo");
   app.add_option("inputs", arguments.inputs, "LEFT RIGHT, or one dataset FOLDER");
   app.add_option("-o,--output", arguments.output, "folder for the results (made if missing)");
-  app.add_option("--method", arguments.method, "bm (ours) or opencv_bm (cv::StereoBM)")->capture_default_str();
+  app.add_option("--method", arguments.method, "bm (ours) or opencv_bm (cv::StereoBM)")
+      ->capture_default_str();
   app.add_option("--gt", arguments.truth, "true disparities of the left image (PFM, PNG, PGM)");
-  app.add_option("--gt-scale", arguments.truth_scale, "grey levels per px of an 8-bit --gt")->capture_default_str();
-  app.add_option("--layout", arguments.layout, "layout of a dataset FOLDER: middlebury_eval3, "
-                 "middlebury_2001, middlebury_2003, middlebury_2006, kitti_2015, kitti_2012")->capture_default_str();
-  app.add_option("--isa", arguments.isa, "use only this SIMD instruction set (results are the same)");
+  app.add_option("--gt-scale", arguments.truth_scale, "grey levels per px of an 8-bit --gt")
+      ->capture_default_str();
+  app.add_option("--layout", arguments.layout,
+                 "layout of a dataset FOLDER: " + options_internal::KnownNames(StereoLayout{}))
+      ->capture_default_str();
+  app.add_option("--isa", arguments.isa,
+                 "use only this SIMD instruction set (results are the same)");
   app.add_flag("--list-metrics", arguments.list_metrics, "print the table of dissimilarities");
-  const apps::OptionFlags flags(app, stereo::BlockMatcherOptions{},
-                                {{"num_disparities", "--max-disp"}, {"uniqueness_pct", "--uniqueness"}});
+  const apps::OptionFlags flags(
+      app, stereo::BlockMatcherOptions{},
+      {{"num_disparities", "--max-disp"}, {"uniqueness_pct", "--uniqueness"}});
   return apps::RunTool(app, argc, argv, [&] { apps::Run(arguments, flags); });
 }

@@ -1,6 +1,6 @@
-#include <fmt/core.h>
-
 #include <limits>
+
+#include <fmt/core.h>
 #include <opencv2/calib3d.hpp>
 
 #include <sgf/apps/stereo_method.h>
@@ -36,8 +36,10 @@ class OpenCvBlockMatching final : public StereoMethod {
   explicit OpenCvBlockMatching(const stereo::BlockMatcherOptions& o) {
     constexpr int kMultiple = 16, kSmallestBlock = 5;
     if (o.window % 2 == 0 || o.window < kSmallestBlock)
-      throw Error("window", fmt::format("cv::StereoBM takes odd ones from {}, got {}", kSmallestBlock, o.window));
-    matcher_ = cv::StereoBM::create((o.num_disparities + kMultiple - 1) / kMultiple * kMultiple, o.window);
+      throw Error("window", fmt::format("cv::StereoBM takes odd ones from {}, got {}",
+                                        kSmallestBlock, o.window));
+    matcher_ =
+        cv::StereoBM::create((o.num_disparities + kMultiple - 1) / kMultiple * kMultiple, o.window);
     matcher_->setMinDisparity(o.min_disparity);
   }
 

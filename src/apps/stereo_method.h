@@ -1,8 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <opencv2/core.hpp>
 #include <string>
+
+#include <opencv2/core.hpp>
 #include <yaml-cpp/yaml.h>
 
 #include <sgf/stereo/block_matcher.h>
@@ -25,9 +26,9 @@ class StereoMethod {
   virtual YAML::Node Options() const = 0;
 };
 
-/// A method by name: "bm" (BlockMatcher, also "block_matcher") or "opencv_bm" (cv::StereoBM with the
-/// options' disparities, window and uniqueness, all else at OpenCV's defaults; it rounds the number
-/// of disparities up to a multiple of 16, as it must).
+/// A method by name: "bm" (BlockMatcher, also "block_matcher") or "opencv_bm" (cv::StereoBM with
+/// the options' disparities, window and uniqueness, all else at OpenCV's defaults; it rounds the
+/// number of disparities up to a multiple of 16, as it must).
 /// @throws Error for an unknown name or options out of range.
 std::unique_ptr<StereoMethod> MakeStereoMethod(const std::string& name,
                                                const stereo::BlockMatcherOptions& options);

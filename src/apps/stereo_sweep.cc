@@ -1,13 +1,13 @@
-#include <fmt/core.h>
-
 #include <chrono>
-#include <opencv2/imgproc.hpp>
+
+#include <fmt/core.h>
 
 #include <sgf/apps/cli.h>
 #include <sgf/apps/stereo_method.h>
 #include <sgf/apps/stereo_sweep.h>
 #include <sgf/eval/disparity.h>
 #include <sgf/io/atomic_file.h>
+#include <sgf/io/image.h>
 #include <sgf/io/stereo_dataset.h>
 
 namespace sgf::apps {
@@ -35,12 +35,17 @@ Sweep ReadSweep(const std::string& file) {
   if (!root.IsMap()) throw Error(file, "expected a map");
   for (const char* key : {"name", "matcher", "columns", "grid"})
     if (!root[key]) throw Error(file, fmt::format("key '{}' is missing", key));
-  static const std::set<std::string> kKnown{"name", "matcher", "columns", "grid", "num_disparities", "options"};
+  static const std::set<std::string> kKnown{"name", "matcher",         "columns",
+                                            "grid", "num_disparities", "options"};
   for (const auto& entry : root)
     if (const auto key = entry.first.as<std::string>(); !kKnown.contains(key))
       throw Error(options_internal::At(file, entry.first), fmt::format("unknown key '{}'", key));
-  Sweep sweep{root["name"].as<std::string>(), root["matcher"].as<std::string>(), root["columns"],
-              root["num_disparities"], root["options"], {}};
+  Sweep sweep{root["name"].as<std::string>(),
+              root["matcher"].as<std::string>(),
+              root["columns"],
+              root["num_disparities"],
+              root["options"],
+              {}};
   ReadOptions(root["grid"], sweep.grid, file);
   if (sweep.grid.windows.empty() || sweep.grid.uniqueness.empty())
     throw Error(file, "grid needs at least one window and one uniqueness");
@@ -72,7 +77,8 @@ Column ReadColumn(const Sweep& sweep, const StereoSweepRequest& request) {
 
 int NumDisparities(const Sweep& sweep, const StereoSweepRequest& request, const StereoPair& pair) {
   if (pair.num_disparities > 0) return pair.num_disparities;
-  const YAML::Node node = sweep.num_disparities ? sweep.num_disparities[request.dataset] : YAML::Node();
+  const YAML::Node node =
+      sweep.num_disparities ? sweep.num_disparities[request.dataset] : YAML::Node();
   if (!node || !node.IsDefined())
     throw Error(request.experiment,
                 fmt::format("num_disparities of {} is missing, and scene {} does not state it",
@@ -80,33 +86,28 @@ int NumDisparities(const Sweep& sweep, const StereoSweepRequest& request, const 
   return node.as<int>();
 }
 
-cv::Mat1b Grey(const cv::Mat& image) {
-  if (image.channels() == 1) return image;
-  cv::Mat1b grey;
-  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  return grey;
-}
-
 double SecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // The CSV lines of one scene and window.
-std::string ScoreWindow(const Sweep& sweep, const StereoSweepRequest& request, const StereoPair& pair,
-                        StereoMethod& method, int window) {
+std::string ScoreWindow(const Sweep& sweep, const StereoSweepRequest& request,
+                        const StereoPair& pair, StereoMethod& method, int window) {
   std::string lines;
   const auto start = std::chrono::steady_clock::now();
-  method.SetPair(Grey(pair.left), Grey(pair.right));
+  method.SetPair(ToGrey(pair.left), ToGrey(pair.right));
   for (const double uniqueness : sweep.grid.uniqueness) {
     const cv::Mat1f disparity = method.Disparity(uniqueness);
     const double seconds = SecondsSince(start);
-    for (const auto& [region, truth] : {std::pair{"all", pair.truth_all}, std::pair{"noc", pair.truth_noc}}) {
+    for (const auto& [region, truth] :
+         {std::pair{"all", pair.truth_all}, std::pair{"noc", pair.truth_noc}}) {
       if (truth.empty()) continue;
       const DisparityScores s = ScoreDisparity(disparity, truth);
-      lines += fmt::format("{},{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.3f}\n",
-                           request.dataset, pair.name, region, sweep.matcher, request.column, window,
-                           uniqueness, s.truth_px, s.matched_px, s.mean_px, s.bad1_pct, s.bad2_pct,
-                           s.bad4_pct, s.d1_pct, s.invalid_pct, seconds);
+      lines += fmt::format(
+          "{},{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.3f}\n",
+          request.dataset, pair.name, region, sweep.matcher, request.column, window, uniqueness,
+          s.truth_px, s.matched_px, s.mean_px, s.bad1_pct, s.bad2_pct, s.bad4_pct, s.d1_pct,
+          s.invalid_pct, seconds);
     }
   }
   return lines;
@@ -118,8 +119,9 @@ void RunStereoSweep(const StereoSweepRequest& request, const CatalogueEntry& ent
                     const std::filesystem::path& folder) {
   const Sweep sweep = ReadSweep(request.experiment);
   Column column = ReadColumn(sweep, request);
-  std::string table = "dataset,scene,region,matcher,column,window,uniqueness,truth_px,matched_px,mean_px,"
-                      "bad1_pct,bad2_pct,bad4_pct,d1_pct,invalid_pct,seconds\n";
+  std::string table =
+      "dataset,scene,region,matcher,column,window,uniqueness,truth_px,matched_px,mean_px,"
+      "bad1_pct,bad2_pct,bad4_pct,d1_pct,invalid_pct,seconds\n";
   YAML::Node resolved;
   resolved["implementation"] = column.implementation;
   for (const StereoScene& scene : ListStereoScenes(folder, entry.layout)) {

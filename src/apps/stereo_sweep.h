@@ -11,10 +11,10 @@ namespace sgf::apps {
 
 /// What `sgf_eval stereo` is asked for.
 struct StereoSweepRequest {
-  std::string experiment;  ///< YAML file of the sweep
-  std::string dataset;     ///< name in the catalogue
-  std::string column;      ///< name in the sweep
-  std::string output;      ///< CSV file of scores
+  std::string experiment;      ///< YAML file of the sweep
+  std::string dataset;         ///< name in the catalogue
+  std::string column;          ///< name in the sweep
+  std::string output;          ///< CSV file of scores
   std::string options_output;  ///< YAML file for every parameter; may be empty
   int threads = 1;
 };

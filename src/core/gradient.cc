@@ -1,6 +1,6 @@
-#include <fmt/core.h>
-
 #include <array>
+
+#include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
 
 #include <sgf/core/error.h>

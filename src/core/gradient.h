@@ -1,8 +1,9 @@
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <span>
 #include <utility>
+
+#include <opencv2/core.hpp>
 
 namespace sgf {
 

@@ -1,14 +1,14 @@
 #pragma once
 
-#include <fmt/core.h>
-#include <yaml-cpp/yaml.h>
-
 #include <set>
 #include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include <fmt/core.h>
+#include <yaml-cpp/yaml.h>
 
 #include <sgf/core/error.h>
 
@@ -21,12 +21,14 @@
 ///       }
 ///     };
 ///
-/// and that list alone drives reading, writing, command-line flags and documentation. A field may be
-/// a number, bool, string, an enum with EnumNames(), a vector of those, or nested options.
+/// and that list alone drives reading, writing, command-line flags and documentation. A field may
+/// be a number, bool, string, an enum with EnumNames(), a vector of those, or nested options.
 namespace sgf {
 
 template <class T>
-concept OptionsStruct = requires(T t) { t.VisitFields([](auto&&...) {}); };
+concept OptionsStruct = requires(T t) {
+  t.VisitFields([](auto&&...) {});
+};
 
 /// One line of the documentation of an options struct.
 struct OptionDoc {
@@ -62,7 +64,8 @@ std::string FormatValue(const T& value) {
 template <class T>
 std::string KnownNames(T value) {
   std::string names;
-  for (const auto& [name, v] : EnumNames(value)) names += (names.empty() ? "" : ", ") + std::string(name);
+  for (const auto& [name, v] : EnumNames(value))
+    names += (names.empty() ? "" : ", ") + std::string(name);
   return names;
 }
 
@@ -80,7 +83,8 @@ void ParseValue(const YAML::Node& node, const std::string& key, const std::strin
     try {
       value = node.as<T>();
     } catch (const YAML::Exception&) {
-      throw Error(At(file, node), fmt::format("cannot read '{}' as the value of {}", YAML::Dump(node), key));
+      throw Error(At(file, node),
+                  fmt::format("cannot read '{}' as the value of {}", YAML::Dump(node), key));
     }
   }
 }
@@ -105,7 +109,7 @@ void ReadOptions(const YAML::Node& map, O& options, const std::string& file) {
       options_internal::ParseValue(node, name, file, value);
   });
   for (const auto& entry : map) {
-    const auto key = entry.first.as<std::string>();
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : YAML::Dump(entry.first);
     if (!known.contains(key))
       throw Error(options_internal::At(file, entry.first), fmt::format("unknown key '{}'", key));
   }

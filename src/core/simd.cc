@@ -1,10 +1,10 @@
-#include <fmt/core.h>
-#include <fmt/ranges.h>
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <bit>
 #include <cctype>
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+#include <hwy/highway.h>
 
 #include <sgf/core/error.h>
 #include <sgf/core/simd.h>
@@ -23,7 +23,8 @@ std::string LowerName(int64_t target) {
 
 std::vector<std::string> SimdTargets() {
   std::vector<std::string> names;
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) names.push_back(LowerName(target));
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets())
+    names.push_back(LowerName(target));
   return names;
 }
 

@@ -3,18 +3,18 @@
 // A band is processed row by row. When an image row enters, every left column x updates its column
 // sums V[x][d] over the window's rows, and the window sum slides along x:
 // H[x][d] = H[x-1][d] + V[x+r][d] - V[x-r-1][d]. Lanes run along d. The costs of the last `window`
-// rows stay in a ring so that they can be taken off when they leave. All sums are exact integers, so
-// nothing depends on how rows are split into bands.
+// rows stay in a ring so that they can be taken off when they leave. All sums are exact integers,
+// so nothing depends on how rows are split into bands.
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sgf/stereo/band.cc"
 #include <hwy/foreach_target.h>
 // foreach_target.h has to come first.
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <array>
 #include <numeric>
+
+#include <hwy/highway.h>
 
 #include <sgf/stereo/band.h>
 #include <sgf/stereo/sgf_rows-inl.h>
@@ -32,7 +32,9 @@ class RowSource {
   using D = hn::ScalableTag<Sum>;
 
   RowSource(const BandTask& task, CostRows& rows, int stride)
-      : rows_(rows), stride_(stride), size_(static_cast<size_t>(task.width) * stride),
+      : rows_(rows),
+        stride_(stride),
+        size_(static_cast<size_t>(task.width) * stride),
         costs_(hwy::AllocateAligned<Cost>(size_)) {
     std::fill_n(costs_.get(), size_, Cost{0});
   }
@@ -58,9 +60,13 @@ template <class Source>
 class BandMatcher {
  public:
   BandMatcher(const BandTask& task, int stride, Source& source)
-      : task_(task), source_(source), radius_(task.window / 2), stride_(stride),
+      : task_(task),
+        source_(source),
+        radius_(task.window / 2),
+        stride_(stride),
         whole_(task.num_disparities / LanesOf<Sum>() * LanesOf<Sum>()),
-        finder_(task, stride), right_view_(task, stride) {
+        finder_(task, stride),
+        right_view_(task, stride) {
     const size_t row = static_cast<size_t>(task.width) * stride;
     ring_ = Filled<Cost>(task.window * row, 0);
     column_sums_ = Filled<Sum>((task.width + 2 * radius_ + 1) * static_cast<size_t>(stride), 0);
@@ -317,9 +323,9 @@ void MatchCostBand(const BandTask& task, CostRows& costs) {
 }
 
 int SgfCostScale(int window) {
-  // 8 bits would hold twice this. But r = scale / max(||a||^2, tau) saturates at 2^15 - 1, so that tau
-  // is at least scale / 32767: half the resolution of a cost buys half the tau, and weak gradients
-  // tell more than the last bit of a strong one's cost.
+  // 8 bits would hold twice this. But r = scale / max(||a||^2, tau) saturates at 2^15 - 1, so that
+  // tau is at least scale / 32767: half the resolution of a cost buys half the tau, and weak
+  // gradients tell more than the last bit of a strong one's cost.
   constexpr int kLargest = 63;
   // Rounding can take a cost two past its range [0, 2 scale].
   return std::min(kLargest, 65534 / (2 * window * window) - 1);

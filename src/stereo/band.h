@@ -4,8 +4,9 @@
 
 #include <cstdint>
 #include <limits>
-#include <opencv2/core.hpp>
 #include <vector>
+
+#include <opencv2/core.hpp>
 
 #include <sgf/core/gradient.h>
 #include <sgf/stereo/block_matcher.h>
@@ -14,16 +15,16 @@ namespace sgf::stereo::internal {
 
 /// One band of output rows and what is wanted of them.
 struct BandTask {
-  int width, height;                     ///< of the images, px
-  int y_begin, y_end;                    ///< rows to write
-  int min_disparity, num_disparities;    ///< px
-  int window;                            ///< px, odd
-  int uniqueness_q16;                    ///< required margin over the winner's cost * 2^16; 0 is off
+  int width, height;                   ///< of the images, px
+  int y_begin, y_end;                  ///< rows to write
+  int min_disparity, num_disparities;  ///< px
+  int window;                          ///< px, odd
+  int uniqueness_q16;                  ///< required margin over the winner's cost * 2^16; 0 is off
   Subpixel subpixel;
-  int left_right_max;                    ///< px; negative is off
-  cv::Mat1s* disparity;                  ///< output, 1/16 px
-  cv::Mat1i* best;                       ///< output or null
-  cv::Mat1i* second;                     ///< output or null
+  int left_right_max;    ///< px; negative is off
+  cv::Mat1s* disparity;  ///< output, 1/16 px
+  cv::Mat1i* best;       ///< output or null
+  cv::Mat1i* second;     ///< output or null
 };
 
 /// Costs of one image row against all disparities, for dissimilarities other than fixed-point sgf.
@@ -49,8 +50,8 @@ struct SgfImage {
   float tau;
 };
 
-/// Largest cost scale s for which a window's sum of costs, each at most 2 s, fits 16 bits and a cost
-/// fits 8; a dissimilarity of 1 becomes the cost s.
+/// Largest cost scale s for which a window's sum of costs, each at most 2 s, fits 16 bits and a
+/// cost fits 8; a dissimilarity of 1 becomes the cost s.
 int SgfCostScale(int window);
 
 /// Sum over rows [begin, end) of squared gradient magnitudes of an 8-bit image, exact in units of

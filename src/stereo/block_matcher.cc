@@ -1,10 +1,10 @@
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include <fmt/core.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -63,19 +63,21 @@ void RequirePair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOp
   RequireGreyImage(left, "left image");
   RequireGreyImage(right, "right image");
   if (left.size() != right.size() || left.type() != right.type())
-    throw Error("right image", fmt::format("is {}x{} {}, the left image {}x{} {}", right.cols, right.rows,
-                                           cv::typeToString(right.type()), left.cols, left.rows,
-                                           cv::typeToString(left.type())));
+    throw Error("right image", fmt::format("is {}x{} {}, the left image {}x{} {}", right.cols,
+                                           right.rows, cv::typeToString(right.type()), left.cols,
+                                           left.rows, cv::typeToString(left.type())));
   if (options.window > std::min(left.cols, left.rows))
-    throw Error("window", fmt::format("{} exceeds the image of {}x{}", options.window, left.cols, left.rows));
+    throw Error("window",
+                fmt::format("{} exceeds the image of {}x{}", options.window, left.cols, left.rows));
   if (options.num_disparities > left.cols)
-    throw Error("num_disparities",
-                fmt::format("{} exceeds the image's width of {}", options.num_disparities, left.cols));
+    throw Error("num_disparities", fmt::format("{} exceeds the image's width of {}",
+                                               options.num_disparities, left.cols));
 }
 
 int UniquenessQ16(double percent) { return static_cast<int>(std::lround(percent / 100 * 65536)); }
 
-// Eq. 6 of an 8-bit image without a gradient image: exact, so the same number as MeanSquaredGradient.
+// Eq. 6 of an 8-bit image without a gradient image: exact, so the same number as
+// MeanSquaredGradient.
 double MeanSquaredGradient(const cv::Mat1b& image, const BlockMatcherOptions& options) {
   constexpr int kParts = 8;
   std::array<int64_t, kParts> sums{};
@@ -94,12 +96,18 @@ bool UsesPixels(const cv::Mat& image, const BlockMatcherOptions& options) {
 
 SgfImage FromPixels(const cv::Mat& image, const BlockMatcherOptions& options) {
   const double epsilon = MeanSquaredGradient(image, options) + options.epsilon.noise_floor;
-  return {image, options.gradient, {}, cv::Mat1f(1, 1, static_cast<float>(epsilon)),
+  return {image,
+          options.gradient,
+          {},
+          cv::Mat1f(1, 1, static_cast<float>(epsilon)),
           static_cast<float>(options.tau)};
 }
 
 SgfImage FromGradient(const cv::Mat& image, const BlockMatcherOptions& options) {
-  SgfImage prepared{{}, options.gradient, ComputeGradient(image, options.gradient), {},
+  SgfImage prepared{{},
+                    options.gradient,
+                    ComputeGradient(image, options.gradient),
+                    {},
                     static_cast<float>(options.tau)};
   prepared.epsilon = metrics::ComputeEpsilon(prepared.gradient, options.epsilon);
   return prepared;
@@ -113,7 +121,8 @@ SgfImage PrepareSgf(const cv::Mat& image, const BlockMatcherOptions& options) {
 template <class MatchBand>
 void ForEachBand(const BandTask& whole, int threads, const MatchBand& match_band) {
   const int count = ResolveThreads(threads);
-  const int bands = std::min(count == 1 ? 1 : 2 * count, std::max(1, whole.height / (2 * whole.window)));
+  const int bands =
+      std::min(count == 1 ? 1 : 2 * count, std::max(1, whole.height / (2 * whole.window)));
   ParallelFor(bands, count, [&](int i) {
     BandTask band = whole;
     band.y_begin = static_cast<int>(int64_t{whole.height} * i / bands);
@@ -122,11 +131,13 @@ void ForEachBand(const BandTask& whole, int threads, const MatchBand& match_band
   });
 }
 
-void RunBands(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options, BandTask task) {
+void RunBands(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options,
+              BandTask task) {
   if (options.metric == "sgf") {
     const SgfImage l = PrepareSgf(left, options);
     const SgfImage r = PrepareSgf(right, options);
-    ForEachBand(task, options.threads, [&](const BandTask& band) { internal::MatchSgfBand(band, l, r); });
+    ForEachBand(task, options.threads,
+                [&](const BandTask& band) { internal::MatchSgfBand(band, l, r); });
     return;
   }
   const auto factory = internal::PrepareCostRows(left, right, options);
@@ -172,8 +183,9 @@ BlockMatcher::BlockMatcher(BlockMatcherOptions options) : options_(std::move(opt
 namespace {
 
 BandTask MakeTask(const BlockMatcherOptions& o, cv::Mat1s& out) {
-  return {out.cols, out.rows, 0, out.rows, o.min_disparity, o.num_disparities, o.window,
-          0, o.subpixel, o.left_right_max, &out, nullptr, nullptr};
+  return {
+      out.cols,   out.rows,         0,    out.rows, o.min_disparity, o.num_disparities, o.window, 0,
+      o.subpixel, o.left_right_max, &out, nullptr,  nullptr};
 }
 
 }  // namespace
@@ -200,7 +212,8 @@ Matches BlockMatcher::Match(const cv::Mat& left, const cv::Mat& right) const {
   return matches;
 }
 
-cv::Mat1s BlockMatcher::Filter(const Matches& matches, const cv::Mat& left, double uniqueness_pct) const {
+cv::Mat1s BlockMatcher::Filter(const Matches& matches, const cv::Mat& left,
+                               double uniqueness_pct) const {
   cv::Mat1s disparity = matches.disparity.clone();
   const int64_t q16 = UniquenessQ16(uniqueness_pct);
   const auto close = [q16](int best, int second) { return second <= best + ((best * q16) >> 16); };

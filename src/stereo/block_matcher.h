@@ -1,9 +1,10 @@
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <span>
 #include <string>
 #include <utility>
+
+#include <opencv2/core.hpp>
 
 #include <sgf/core/gradient.h>
 #include <sgf/metrics/epsilon.h>
@@ -77,14 +78,17 @@ struct BlockMatcherOptions {
     visit("tau", tau, "", "lower bound of the denominator of sgf, eq. 10");
     visit("pm", pm, "", "parameters of pm, eq. 4");
     visit("subpixel", subpixel, "", "interpolation of the winner's cost");
-    visit("uniqueness_pct", uniqueness_pct, "%",
-          "a match is dropped unless every candidate other than the winner and its neighbours costs "
-          "more than (1 + this) times the winner; 0 keeps all");
+    visit(
+        "uniqueness_pct", uniqueness_pct, "%",
+        "a match is dropped unless every candidate other than the winner and its neighbours costs "
+        "more than (1 + this) times the winner; 0 keeps all");
     visit("texture_threshold", texture_threshold, "grey levels/px",
-          "a match is dropped where the mean gradient magnitude over the window is below; 0 keeps all");
+          "a match is dropped where the mean gradient magnitude over the window is below; 0 keeps "
+          "all");
     visit("left_right_max", left_right_max, "px",
           "largest difference to the disparity found from the right image; -1 turns the check off");
-    visit("speckle_window", speckle_window, "px", "connected regions up to this size are dropped; 0 keeps all");
+    visit("speckle_window", speckle_window, "px",
+          "connected regions up to this size are dropped; 0 keeps all");
     visit("speckle_range", speckle_range, "px", "largest step inside a connected region");
     visit("threads", threads, "", "threads over bands of rows; 0 for all cores");
   }
@@ -99,8 +103,8 @@ struct Matches {
 };
 
 /// Local stereo matching of rectified images: window sums of a dissimilarity, winner-take-all over
-/// the disparities, sub-pixel interpolation and checks (eqs. 16, 17 of the paper). Works row by row:
-/// memory grows with width * disparities * window, never with height * disparities.
+/// the disparities, sub-pixel interpolation and checks (eqs. 16, 17 of the paper). Works row by
+/// row: memory grows with width * disparities * window, never with height * disparities.
 ///
 /// Disparity d pairs left pixel x with right pixel x - d. A pixel's candidates are the disparities
 /// whose right pixel lies inside the image. Windows are cut at the border of the left image; where

@@ -1,10 +1,10 @@
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 #include <vector>
+
+#include <fmt/core.h>
+#include <opencv2/imgproc.hpp>
 
 #include <sgf/core/error.h>
 #include <sgf/metrics/registry.h>
@@ -17,13 +17,14 @@ namespace {
 using metrics::Sample;
 using metrics::SampleImage;
 
-// The right image turned so that increasing disparities are contiguous: the pixel that left column x
-// meets at disparity index d stands at Column(x) + d. Border columns are repeated outside.
+// The right image turned so that increasing disparities are contiguous: the pixel that left column
+// x meets at disparity index d stands at Column(x) + d. Border columns are repeated outside.
 struct Mirror {
   int width, min_disparity, before, after;
 
   Mirror(int image_width, const BlockMatcherOptions& options)
-      : width(image_width), min_disparity(options.min_disparity),
+      : width(image_width),
+        min_disparity(options.min_disparity),
         before(std::max(0, -options.min_disparity)),
         after(std::max(0, options.min_disparity) + options.num_disparities) {}
 
@@ -50,12 +51,19 @@ struct SampleRow {
   const float *intensity, *gx, *gy, *norm, *reg_norm, *ax, *ay, *r;
 
   SampleRow(const SampleImage& image, int y)
-      : intensity(image.intensity[y]), gx(image.gx[y]), gy(image.gy[y]), norm(image.norm[y]),
-        reg_norm(image.reg_norm[y]), ax(image.ax[y]), ay(image.ay[y]), r(image.r[y]) {}
+      : intensity(image.intensity[y]),
+        gx(image.gx[y]),
+        gy(image.gy[y]),
+        norm(image.norm[y]),
+        reg_norm(image.reg_norm[y]),
+        ax(image.ax[y]),
+        ay(image.ay[y]),
+        r(image.r[y]) {}
 
   template <class T = float>
   Sample<T> At(int x) const {
-    return {T(intensity[x]), T(gx[x]), T(gy[x]), T(norm[x]), T(reg_norm[x]), T(ax[x]), T(ay[x]), T(r[x])};
+    return {T(intensity[x]), T(gx[x]), T(gy[x]), T(norm[x]),
+            T(reg_norm[x]),  T(ax[x]), T(ay[x]), T(r[x])};
   }
 };
 
@@ -83,10 +91,13 @@ struct SamplePair {
   Mirror mirror;
   int num_disparities;
 
-  SamplePair(const cv::Mat& left_image, const cv::Mat& right_image, const BlockMatcherOptions& options)
+  SamplePair(const cv::Mat& left_image, const cv::Mat& right_image,
+             const BlockMatcherOptions& options)
       : left(metrics::MakeSampleImage(left_image, options.gradient, options.epsilon, options.tau)),
-        right(metrics::MakeSampleImage(right_image, options.gradient, options.epsilon, options.tau)),
-        mirror(left_image.cols, options), num_disparities(options.num_disparities) {
+        right(
+            metrics::MakeSampleImage(right_image, options.gradient, options.epsilon, options.tau)),
+        mirror(left_image.cols, options),
+        num_disparities(options.num_disparities) {
     ForEachPlane(right, [&](cv::Mat1f& plane) { plane = Mirrored(plane, mirror); });
   }
 };
@@ -125,13 +136,14 @@ void Snap(cv::Mat1f& plane) {
   for (float& value : plane) value = std::nearbyint(value / step) * step;
 }
 
-// Dissimilarities with a window of their own: their sums over the window's columns are kept for every
-// column and disparity, and slide down by rows and along x.
+// Dissimilarities with a window of their own: their sums over the window's columns are kept for
+// every column and disparity, and slide down by rows and along x.
 template <class Metric>
 class WindowCostRows final : public CostRows {
  public:
   WindowCostRows(std::shared_ptr<const SamplePair> pair, int window)
-      : pair_(std::move(pair)), radius_(window / 2),
+      : pair_(std::move(pair)),
+        radius_(window / 2),
         columns_(static_cast<size_t>(pair_->mirror.width) * pair_->num_disparities) {}
 
   void Row(int y, int stride, uint16_t* costs) override {
@@ -162,7 +174,9 @@ class WindowCostRows final : public CostRows {
     }
   }
 
-  Sums& Column(int x, int d) { return columns_[static_cast<size_t>(x) * pair_->num_disparities + d]; }
+  Sums& Column(int x, int d) {
+    return columns_[static_cast<size_t>(x) * pair_->num_disparities + d];
+  }
 
   void SlideAlong(int d, int stride, uint16_t* costs) {
     const Metric metric;
@@ -186,8 +200,12 @@ class WindowCostRows final : public CostRows {
 class CensusCostRows final : public CostRows {
  public:
   CensusCostRows(std::shared_ptr<const metrics::CensusImage> left,
-                 std::shared_ptr<const metrics::CensusImage> right, const Mirror& mirror, int num_disparities)
-      : left_(std::move(left)), right_(std::move(right)), mirror_(mirror), num_disparities_(num_disparities) {}
+                 std::shared_ptr<const metrics::CensusImage> right, const Mirror& mirror,
+                 int num_disparities)
+      : left_(std::move(left)),
+        right_(std::move(right)),
+        mirror_(mirror),
+        num_disparities_(num_disparities) {}
 
   void Row(int y, int stride, uint16_t* costs) override {
     const metrics::Census census;
@@ -216,7 +234,8 @@ Metric WithParameters(Metric metric, const BlockMatcherOptions& options) {
 
 // One maker per kind of dissimilarity.
 template <class Metric>
-CostRowsFactory MakeFactory(const Metric& metric, const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {
+CostRowsFactory MakeFactory(const Metric& metric, const cv::Mat& left, const cv::Mat& right,
+                            const BlockMatcherOptions& options) {
   if constexpr (metrics::PointMetric<Metric>) {
     auto pair = std::make_shared<const SamplePair>(left, right, options);
     return {[=] { return std::make_unique<PointCostRows<Metric>>(metric, pair); }, options.window};
@@ -233,13 +252,15 @@ CostRowsFactory MakeFactory(const Metric& metric, const cv::Mat& left, const cv:
     const int count = options.num_disparities;
     return {[=] { return std::make_unique<CensusCostRows>(l, r, mirror, count); }, options.window};
   } else {
-    throw Error("metric", fmt::format("'{}' compares patches and cannot be a stereo cost", Metric::kInfo.name));
+    throw Error("metric", fmt::format("'{}' compares patches and cannot be a stereo cost",
+                                      Metric::kInfo.name));
   }
 }
 
 }  // namespace
 
-CostRowsFactory PrepareCostRows(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {
+CostRowsFactory PrepareCostRows(const cv::Mat& left, const cv::Mat& right,
+                                const BlockMatcherOptions& options) {
   return metrics::VisitMetric(options.metric, [&](auto metric) {
     return MakeFactory(WithParameters(metric, options), left, right, options);
   });

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+
 #include <opencv2/core.hpp>
 
 #include <sgf/stereo/band.h>
@@ -17,9 +18,9 @@ struct CostRowsFactory {
   int window;  ///< over which costs are summed: 1 where the dissimilarity has a window of its own
 };
 
-/// Prepares both images for `options.metric` (a name of the table with a single number per pixel pair
-/// or window) and returns the maker of its cost rows. Costs are |e| in units of 1/resolution, at most
-/// 65535: 1/256 grey level or 1/16384 for dissimilarities bounded by 2.
+/// Prepares both images for `options.metric` (a name of the table with a single number per pixel
+/// pair or window) and returns the maker of its cost rows. Costs are |e| in units of 1/resolution,
+/// at most 65535: 1/256 grey level or 1/16384 for dissimilarities bounded by 2.
 CostRowsFactory PrepareCostRows(const cv::Mat& left, const cv::Mat& right,
                                 const BlockMatcherOptions& options);
 

@@ -1,5 +1,4 @@
 #include <fmt/core.h>
-
 #include <opencv2/imgproc.hpp>
 
 #include <sgf/core/error.h>
@@ -26,7 +25,8 @@ cv::Mat1f NormalizedResponse(const cv::Mat& image, int window) {
 cv::Mat ApplyPrefilter(const cv::Mat& image, const BlockMatcherOptions& options) {
   if (options.prefilter == Prefilter::kNone) return image;
   if (image.type() != CV_8UC1)
-    throw Error("prefilter", fmt::format("needs 8-bit images, got {}", cv::typeToString(image.type())));
+    throw Error("prefilter",
+                fmt::format("needs 8-bit images, got {}", cv::typeToString(image.type())));
   cv::Mat1f response;
   if (options.prefilter == Prefilter::kXSobel)
     cv::Sobel(image, response, CV_32F, 1, 0, 3, 1, 0, kBorder);

@@ -1,4 +1,5 @@
-// Rows of fixed-point sgf samples and their costs, per instruction set (Highway's -inl.h convention).
+// Rows of fixed-point sgf samples and their costs, per instruction set (Highway's -inl.h
+// convention).
 
 #if defined(SGF_STEREO_SGF_ROWS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SGF_STEREO_SGF_ROWS_INL_H_
@@ -7,11 +8,11 @@
 #define SGF_STEREO_SGF_ROWS_INL_H_
 #endif
 
-#include <hwy/aligned_allocator.h>
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <vector>
+
+#include <hwy/aligned_allocator.h>
+#include <hwy/highway.h>
 
 #include <sgf/stereo/band.h>
 
@@ -60,9 +61,11 @@ constexpr int kSlack = HWY_MAX_BYTES;
 class IntegerGradient {
  public:
   IntegerGradient(int width, GradientOperator op)
-      : width_(width), side_(op == GradientOperator::kScharr ? 3 : 0),
+      : width_(width),
+        side_(op == GradientOperator::kScharr ? 3 : 0),
         centre_(op == GradientOperator::kScharr ? 10 : 16),
-        smoothed_(width + 2 + kSlack), difference_(width + 2 + kSlack) {}
+        smoothed_(width + 2 + kSlack),
+        difference_(width + 2 + kSlack) {}
 
   // Prepares row y: sums across for the x derivative, differences across for the y derivative.
   void SetRow(const cv::Mat1b& image, int y) {
@@ -113,7 +116,8 @@ class IntegerGradient {
 constexpr float kIntegerGradientUnit = 1.F / 32;  // grey levels per pixel
 
 // Gradient of row y, grey levels per pixel. Whole vectors are written.
-HWY_INLINE void GradientRow(IntegerGradient& gradient, const cv::Mat1b& image, int y, float* gx, float* gy) {
+HWY_INLINE void GradientRow(IntegerGradient& gradient, const cv::Mat1b& image, int y, float* gx,
+                            float* gy) {
   const hn::ScalableTag<float> df;
   const hn::Rebind<int32_t, decltype(df)> di;
   const hn::Rebind<int16_t, decltype(df)> d_half;
@@ -174,17 +178,16 @@ int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begi
 
 // MakeSample<float> and QuantizeSample on lanes, in the same order of operations.
 // @param epsilon one value, or with `epsilon_map` one a column.
-HWY_INLINE void QuantizeRow(const float* gx, const float* gy, const float* epsilon, bool epsilon_map,
-                            float tau, int scale, int width, SgfRow& out) {
+HWY_INLINE void QuantizeRow(const float* gx, const float* gy, const float* epsilon,
+                            bool epsilon_map, float tau, int scale, int width, SgfRow& out) {
   const hn::ScalableTag<float> df;
   const hn::Rebind<int16_t, decltype(df)> d16;
   const int lanes = static_cast<int>(hn::Lanes(df));
   const auto one = hn::Set(df, 1.F);
   const auto unit = hn::Set(df, 32767.F);
   using VF = hn::Vec<decltype(df)>;
-  const auto store = [&](VF v, int16_t* to) HWY_ATTR {
-    hn::StoreU(hn::DemoteTo(d16, hn::NearestInt(v)), d16, to);
-  };
+  const auto store = [&](VF v, int16_t* to)
+                         HWY_ATTR { hn::StoreU(hn::DemoteTo(d16, hn::NearestInt(v)), d16, to); };
   for (int x = 0; x < width; x += lanes) {
     const auto gx_x = hn::LoadU(df, gx + x);
     const auto gy_x = hn::LoadU(df, gy + x);
@@ -206,8 +209,13 @@ HWY_INLINE void QuantizeRow(const float* gx, const float* gy, const float* epsil
 class SgfRowMaker {
  public:
   SgfRowMaker(const SgfImage& image, int width, int scale)
-      : image_(image), width_(width), scale_(scale), integer_gradient_(width, image.op),
-        gx_(width + kSlack), gy_(width + kSlack), epsilon_(width + kSlack) {}
+      : image_(image),
+        width_(width),
+        scale_(scale),
+        integer_gradient_(width, image.op),
+        gx_(width + kSlack),
+        gy_(width + kSlack),
+        epsilon_(width + kSlack) {}
 
   void Make(int y, SgfRow& out) {
     if (image_.pixels.empty()) {
@@ -235,10 +243,16 @@ class SgfSource {
   using Cost = uint8_t;
 
   SgfSource(const BandTask& task, const SgfImage& left, const SgfImage& right, int stride)
-      : width_(task.width), min_disparity_(task.min_disparity), scale_(SgfCostScale(task.window)),
-        before_(std::max(0, -task.min_disparity)), after_(std::max(0, task.min_disparity) + stride),
-        left_(left, width_, scale_), right_(right, width_, scale_),
-        left_row_(width_, 0, kSlack), right_row_(width_, 0, kSlack), mirrored_(width_, before_, after_) {}
+      : width_(task.width),
+        min_disparity_(task.min_disparity),
+        scale_(SgfCostScale(task.window)),
+        before_(std::max(0, -task.min_disparity)),
+        after_(std::max(0, task.min_disparity) + stride),
+        left_(left, width_, scale_),
+        right_(right, width_, scale_),
+        left_row_(width_, 0, kSlack),
+        right_row_(width_, 0, kSlack),
+        mirrored_(width_, before_, after_) {}
 
   void StartRow(int y) {
     left_.Make(y, left_row_);
@@ -263,8 +277,8 @@ class SgfSource {
   HWY_INLINE Column At(int x) const {
     const D16 d;
     const int k = width_ - 1 - x + min_disparity_;
-    const LaneSample left{{hn::Set(d, left_row_.ax[x])}, {hn::Set(d, left_row_.ay[x])},
-                          {hn::Set(d, left_row_.r[x])}};
+    const LaneSample left{
+        {hn::Set(d, left_row_.ax[x])}, {hn::Set(d, left_row_.ay[x])}, {hn::Set(d, left_row_.r[x])}};
     return {left, hn::Set(d, static_cast<int16_t>(scale_)), mirrored_.ax + k, mirrored_.ay + k,
             mirrored_.r + k};
   }

@@ -14,7 +14,8 @@ namespace sgf {
 /// disparities, and throws sgf::Error for bad input.
 class StereoSgf : public cv::StereoMatcher {
  public:
-  /// @param num_disparities number of integer disparities searched, px; 0 stands for 64 as in OpenCV.
+  /// @param num_disparities number of integer disparities searched, px; 0 stands for 64 as in
+  /// OpenCV.
   /// @param block_size side of the square window, px, odd.
   static cv::Ptr<StereoSgf> create(int num_disparities = 0, int block_size = 9);
 

@@ -10,15 +10,15 @@
 #define SGF_STEREO_WINNERS_INL_H_
 #endif
 
-#include <hwy/aligned_allocator.h>
-#include <hwy/highway.h>
-
 #include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <limits>
 #include <numeric>
 #include <vector>
+
+#include <hwy/aligned_allocator.h>
+#include <hwy/highway.h>
 
 #include <sgf/stereo/band.h>
 
@@ -30,8 +30,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 constexpr int kPixels = 8;
 constexpr int kAround = 5;  // sums looked at around a winner
 
-// How sums are held in lanes. 16-bit sums use all 16 bits: they are stored less 2^15, so that signed
-// lanes compare them. kMax stands for "no candidate" and is above every sum.
+// How sums are held in lanes. 16-bit sums use all 16 bits: they are stored less 2^15, so that
+// signed lanes compare them. kMax stands for "no candidate" and is above every sum.
 template <class Sum>
 struct SumTraits {
   static constexpr Sum kOffset = sizeof(Sum) == 2 ? std::numeric_limits<Sum>::min() : 0;
@@ -62,7 +62,8 @@ HWY_INLINE void ReduceEach(const T* vectors, T* out, Op op) {
     hn::Store(fold(even, odd), d, blocks);
     const hn::CappedTag<T, kPixels> d_block;
     auto result = hn::Load(d_block, blocks);
-    for (int k = kPixels; k < lanes; k += kPixels) result = op(result, hn::Load(d_block, blocks + k));
+    for (int k = kPixels; k < lanes; k += kPixels)
+      result = op(result, hn::Load(d_block, blocks + k));
     hn::Store(result, d_block, out);
     return;
   }
@@ -78,14 +79,14 @@ HWY_INLINE void ReduceEach(const T* vectors, T* out, Op op) {
 // The winners of eight pixels.
 template <class Sum>
 struct Winners {
-  HWY_ALIGN Sum least[kPixels];             // the winner's sum
-  HWY_ALIGN Sum limit[kPixels];             // a sum below it is too close to the winner's
-  HWY_ALIGN Sum rank[kPixels];              // 2^15 - 1 - index of the first candidate below the limit
-  HWY_ALIGN Sum close[kPixels];             // number of candidates below the limit
-  HWY_ALIGN Sum around[kAround][kPixels];         // sums at that index - 1, 0, +1, +2, +3
-  HWY_ALIGN int32_t index[kPixels];         // disparity index of the winner
-  HWY_ALIGN int32_t sixteenths[kPixels];    // its sub-pixel index in 1/16 px
-  HWY_ALIGN int32_t accepted[kPixels];      // -1 where it exists and is unique, otherwise 0
+  HWY_ALIGN Sum least[kPixels];  // the winner's sum
+  HWY_ALIGN Sum limit[kPixels];  // a sum below it is too close to the winner's
+  HWY_ALIGN Sum rank[kPixels];   // 2^15 - 1 - index of the first candidate below the limit
+  HWY_ALIGN Sum close[kPixels];  // number of candidates below the limit
+  HWY_ALIGN Sum around[kAround][kPixels];  // sums at that index - 1, 0, +1, +2, +3
+  HWY_ALIGN int32_t index[kPixels];        // disparity index of the winner
+  HWY_ALIGN int32_t sixteenths[kPixels];   // its sub-pixel index in 1/16 px
+  HWY_ALIGN int32_t accepted[kPixels];     // -1 where it exists and is unique, otherwise 0
 };
 
 // Finds winners among `stride` sums per pixel, kMax where there is no candidate.
@@ -93,7 +94,9 @@ template <class Sum>
 class WinnerFinder {
  public:
   WinnerFinder(const BandTask& task, int stride)
-      : task_(task), stride_(stride), rank_(hwy::AllocateAligned<Sum>(stride)),
+      : task_(task),
+        stride_(stride),
+        rank_(hwy::AllocateAligned<Sum>(stride)),
         lanes_(hwy::AllocateAligned<Sum>(3 * kBlock)) {
     for (int k = 0; k < stride; ++k) rank_[k] = static_cast<Sum>(kFirstRank - k);
     std::fill_n(lanes_.get(), 3 * kBlock, Sum{0});
@@ -103,7 +106,8 @@ class WinnerFinder {
   Sum* Least(int p) { return lanes_.get() + p * LanesOf<Sum>(); }
 
   // sums[p] are followed and preceded by three readable values.
-  HWY_INLINE void Find(const std::array<const Sum*, kPixels>& sums, int count, Winners<Sum>& winners) {
+  HWY_INLINE void Find(const std::array<const Sum*, kPixels>& sums, int count,
+                       Winners<Sum>& winners) {
     ReduceEach(Least(0), winners.least, [](auto a, auto b) HWY_ATTR { return hn::Min(a, b); });
     SetLimits(winners);
     for (int p = 0; p < count; ++p) CountBelow(sums[p], winners.limit[p], p);
@@ -129,15 +133,18 @@ class WinnerFinder {
       const hn::Full128<uint16_t> du;
       const auto offset = hn::Set(du, uint16_t{0x8000});
       const auto least = hn::Xor(hn::BitCast(du, hn::Load(d, w.least)), offset);
-      const auto margin = hn::MulHigh(least, hn::Set(du, static_cast<uint16_t>(task_.uniqueness_q16)));
-      const auto limit = hn::SaturatedAdd(hn::SaturatedAdd(least, margin), hn::Set(du, uint16_t{1}));
+      const auto margin =
+          hn::MulHigh(least, hn::Set(du, static_cast<uint16_t>(task_.uniqueness_q16)));
+      const auto limit =
+          hn::SaturatedAdd(hn::SaturatedAdd(least, margin), hn::Set(du, uint16_t{1}));
       hn::Store(hn::BitCast(d, hn::Xor(limit, offset)), d, w.limit);
       return;
     }
 #endif
     for (int p = 0; p < kPixels; ++p) {
       const int64_t sum = int64_t{w.least[p]} - SumTraits<Sum>::kOffset;
-      const int64_t limit = sum + ((sum * task_.uniqueness_q16) >> 16) + 1 + SumTraits<Sum>::kOffset;
+      const int64_t limit =
+          sum + ((sum * task_.uniqueness_q16) >> 16) + 1 + SumTraits<Sum>::kOffset;
       w.limit[p] = static_cast<Sum>(std::min<int64_t>(limit, SumTraits<Sum>::kMax));
     }
   }
@@ -145,7 +152,8 @@ class WinnerFinder {
   // Loads the sums around each pixel's first candidate below the limit.
   HWY_INLINE void LookAround(const std::array<const Sum*, kPixels>& sums, Winners<Sum>& w) const {
     std::array<const Sum*, kPixels> at;
-    for (int p = 0; p < kPixels; ++p) at[p] = sums[p] + std::min(kFirstRank - w.rank[p], stride_ - 1) - 1;
+    for (int p = 0; p < kPixels; ++p)
+      at[p] = sums[p] + std::min(kFirstRank - w.rank[p], stride_ - 1) - 1;
 #if HWY_TARGET != HWY_SCALAR
     if constexpr (sizeof(Sum) == 2) {
       Transpose(at, w.around);
@@ -158,19 +166,27 @@ class WinnerFinder {
 
 #if HWY_TARGET != HWY_SCALAR
   // out[k][p] = at[p][k]: an 8 x 8 transposition whose last rows are not wanted.
-  static HWY_INLINE void Transpose(const std::array<const int16_t*, kPixels>& at, int16_t out[kAround][kPixels]) {
+  static HWY_INLINE void Transpose(const std::array<const int16_t*, kPixels>& at,
+                                   int16_t out[kAround][kPixels]) {
     const hn::Full128<int16_t> d;
     const hn::Full128<int32_t> d2;
     const hn::Full128<int64_t> d4;
     const auto load = [&](int p) HWY_ATTR { return hn::LoadU(d, at[p]); };
-    const auto pair = [&](int p) HWY_ATTR { return hn::BitCast(d2, hn::InterleaveLower(d, load(p), load(p + 1))); };
-    const auto pair_upper = [&](int p) HWY_ATTR { return hn::BitCast(d2, hn::InterleaveUpper(d, load(p), load(p + 1))); };
-    const auto low = [&](auto a, auto b) HWY_ATTR { return hn::BitCast(d4, hn::InterleaveLower(d2, a, b)); };
-    const auto high = [&](auto a, auto b) HWY_ATTR { return hn::BitCast(d4, hn::InterleaveUpper(d2, a, b)); };
+    const auto pair = [&](int p) HWY_ATTR {
+      return hn::BitCast(d2, hn::InterleaveLower(d, load(p), load(p + 1)));
+    };
+    const auto pair_upper = [&](int p) HWY_ATTR {
+      return hn::BitCast(d2, hn::InterleaveUpper(d, load(p), load(p + 1)));
+    };
+    const auto low = [&](auto a, auto b)
+                         HWY_ATTR { return hn::BitCast(d4, hn::InterleaveLower(d2, a, b)); };
+    const auto high = [&](auto a, auto b)
+                          HWY_ATTR { return hn::BitCast(d4, hn::InterleaveUpper(d2, a, b)); };
     const auto store = [&](auto v, int k) HWY_ATTR { hn::Store(hn::BitCast(d, v), d, out[k]); };
     const auto first01 = low(pair(0), pair(2)), second01 = low(pair(4), pair(6));
     const auto first23 = high(pair(0), pair(2)), second23 = high(pair(4), pair(6));
-    const auto first45 = low(pair_upper(0), pair_upper(2)), second45 = low(pair_upper(4), pair_upper(6));
+    const auto first45 = low(pair_upper(0), pair_upper(2)),
+               second45 = low(pair_upper(4), pair_upper(6));
     store(hn::InterleaveLower(d4, first01, second01), 0);
     store(hn::InterleaveUpper(d4, first01, second01), 1);
     store(hn::InterleaveLower(d4, first23, second23), 2);
@@ -211,9 +227,8 @@ class WinnerFinder {
       const auto least = load(w.least), limit = load(w.limit), close = load(w.close);
       const auto s0 = load(w.around[1]), s1 = load(w.around[2]), s2 = load(w.around[3]);
       const auto is0 = hn::Eq(s0, least), is1 = hn::Eq(s1, least), is2 = hn::Eq(s2, least);
-      const auto pick = [&](auto a, auto b, auto c) HWY_ATTR {
-        return hn::IfThenElse(is0, a, hn::IfThenElse(is1, b, c));
-      };
+      const auto pick = [&](auto a, auto b, auto c)
+                            HWY_ATTR { return hn::IfThenElse(is0, a, hn::IfThenElse(is1, b, c)); };
       const auto index = hn::Add(hn::Sub(hn::Set(di, kFirstRank), load(w.rank)),
                                  pick(hn::Zero(di), one, hn::Add(one, one)));
       const auto before = pick(load(w.around[0]), s0, s1);
@@ -237,9 +252,8 @@ class WinnerFinder {
     const hn::RebindToSigned<DF> di;
     if (task_.subpixel == Subpixel::kNone) return hn::Zero(di);
     const auto rise_before = hn::Sub(before, least), rise_after = hn::Sub(after, least);
-    const auto slope = task_.subpixel == Subpixel::kEquiangular
-                           ? hn::Max(rise_before, rise_after)
-                           : hn::Add(rise_before, rise_after);
+    const auto slope = task_.subpixel == Subpixel::kEquiangular ? hn::Max(rise_before, rise_after)
+                                                                : hn::Add(rise_before, rise_after);
     const auto shift = hn::Div(hn::ConvertTo(df, hn::ShiftLeft<3>(hn::Sub(before, after))),
                                hn::ConvertTo(df, hn::Max(slope, hn::Set(di, 1))));
     const auto rounded = hn::ConvertTo(di, hn::Floor(hn::Add(shift, hn::Set(df, 0.5F))));
@@ -259,7 +273,8 @@ class RightView {
   RightView(const BandTask& task, int stride)
       : task_(task), stride_(stride), before_(std::max(0, -task.min_disparity)) {
     if (!Enabled()) return;
-    const size_t size = before_ + task.width + std::max(0, task.min_disparity) + stride + LanesOf<Sum>();
+    const size_t size =
+        before_ + task.width + std::max(0, task.min_disparity) + stride + LanesOf<Sum>();
     least_.resize(size);
     index_.resize(size);
     left_.resize(task.width);
@@ -274,9 +289,9 @@ class RightView {
     std::fill(left_.begin(), left_.end(), -1);
   }
 
-  // Takes the sums and winners of `count` left pixels from x on. A vector of right pixels takes all of
-  // them at once: one pixel after the other would load what the one before has just stored, shifted
-  // by a lane. Sums need kPixels + lanes values of kMax around them.
+  // Takes the sums and winners of `count` left pixels from x on. A vector of right pixels takes all
+  // of them at once: one pixel after the other would load what the one before has just stored,
+  // shifted by a lane. Sums need kPixels + lanes values of kMax around them.
   HWY_INLINE void Add(int x, int count, const std::array<const Sum*, kPixels>& sums,
                       const Winners<Sum>& winners) {
     const hn::ScalableTag<Sum> d;

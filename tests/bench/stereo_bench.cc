@@ -5,9 +5,6 @@
 // case/implementation/isa/threads; mde_per_s is width * height * disparities / 10^6 a second,
 // peak_mib the memory that one call takes beyond what the process held before.
 
-#include <benchmark/benchmark.h>
-#include <fmt/core.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -17,6 +14,9 @@
 #include <string>
 #include <vector>
 
+#include <benchmark/benchmark.h>
+#include <malloc.h>
+#include <fmt/core.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -60,6 +60,7 @@ double StatusMib(const std::string& key) {
 
 // Memory that a call needs at its peak; 0 where the kernel does not let the peak be reset.
 double PeakMib(const std::function<void()>& call) {
+  malloc_trim(0);  // what earlier calls freed does not count as held
   std::ofstream reset("/proc/self/clear_refs");
   if (!(reset << 5 << std::flush)) return 0;
   const double before = StatusMib("VmRSS");
@@ -71,8 +72,8 @@ void Measure(benchmark::State& state, const Case& c, const std::function<void()>
   state.counters["peak_mib"] = PeakMib(match);
   for (auto _ : state) match();
   const double evaluations = static_cast<double>(c.left.total()) * c.disparities / 1e6;
-  state.counters["mde_per_s"] =
-      benchmark::Counter(evaluations * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
+  state.counters["mde_per_s"] = benchmark::Counter(
+      evaluations * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 
 void OpenCvBm(benchmark::State& state, const Case& c, int threads) {
@@ -103,14 +104,16 @@ void SgfBm(benchmark::State& state, const Case& c, const std::string& isa, int t
 }
 
 template <class Run>
-void Register(const Case& c, const char* implementation, const std::string& isa, int threads, Run run) {
+void Register(const Case& c, const char* implementation, const std::string& isa, int threads,
+              Run run) {
   const std::string name = fmt::format("{}/{}/{}/{}", c.name, implementation, isa, threads);
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseRealTime();
 }
 
 void RegisterCase(const Case& c) {
   for (const int threads : {1, 2})
-    Register(c, "opencv_bm", "own", threads, [&c, threads](benchmark::State& state) { OpenCvBm(state, c, threads); });
+    Register(c, "opencv_bm", "own", threads,
+             [&c, threads](benchmark::State& state) { OpenCvBm(state, c, threads); });
   const auto targets = SimdTargets();
   for (const std::string& isa : targets) {
     if (isa == "scalar") continue;

@@ -20,7 +20,8 @@ class ReferenceMatcher {
   /// @param window_sum cost of the window around left pixel (x, y) at a disparity in px.
   template <class WindowSum>
   ReferenceMatcher(cv::Size size, const stereo::BlockMatcherOptions& options, WindowSum window_sum)
-      : size_(size), options_(options),
+      : size_(size),
+        options_(options),
         sums_(static_cast<size_t>(size.area()) * options.num_disparities) {
     for (int y = 0; y < size.height; ++y)
       for (int x = 0; x < size.width; ++x)
@@ -95,8 +96,8 @@ class ReferenceMatcher {
     const int64_t slope = options_.subpixel == stereo::Subpixel::kParabola
                               ? before + after - 2 * least
                               : std::max(before, after) - least;
-    const float shift = static_cast<float>(8 * (before - after)) /
-                        static_cast<float>(std::max<int64_t>(slope, 1));
+    const float shift =
+        static_cast<float>(8 * (before - after)) / static_cast<float>(std::max<int64_t>(slope, 1));
     return static_cast<int>(std::floor(shift + 0.5F));
   }
 

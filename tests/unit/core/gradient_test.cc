@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
 #include <opencv2/core.hpp>
 
 #include <sgf/core/error.h>

@@ -63,8 +63,10 @@ TEST(Options, WritesWhatItReads) {
 TEST(Options, NamesFileLineAndKeyOfWhatIsWrong) {
   EXPECT_EQ(MessageOf("window: 3\nwindwo: 4"), "run.yaml:2: unknown key 'windwo'");
   EXPECT_EQ(MessageOf("window: 3\ninner:\n  rato: 4"), "run.yaml:3: unknown key 'rato'");
+  EXPECT_EQ(MessageOf("? [a]\n: 4"), "run.yaml:1: unknown key '[a]'");
   EXPECT_EQ(MessageOf("window: wide"), "run.yaml:1: cannot read 'wide' as the value of window");
-  EXPECT_EQ(MessageOf("gradient: sobel"), "run.yaml:1: gradient is 'sobel'; known: central, scharr");
+  EXPECT_EQ(MessageOf("gradient: sobel"),
+            "run.yaml:1: gradient is 'sobel'; known: central, scharr");
   EXPECT_EQ(MessageOf("[1, 2]"), "run.yaml:1: expected a map of options");
 }
 

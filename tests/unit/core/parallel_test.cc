@@ -1,7 +1,7 @@
-#include <gtest/gtest.h>
-
 #include <atomic>
 #include <vector>
+
+#include <gtest/gtest.h>
 
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
@@ -22,7 +22,11 @@ TEST(Parallel, DoesNothingForNoWork) {
 }
 
 TEST(Parallel, PassesExceptionsOn) {
-  EXPECT_THROW(ParallelFor(8, 2, [](int i) { if (i == 5) throw Error("body", "five"); }), Error);
+  EXPECT_THROW(ParallelFor(8, 2,
+                           [](int i) {
+                             if (i == 5) throw Error("body", "five");
+                           }),
+               Error);
 }
 
 TEST(Parallel, RejectsNegativeThreadCounts) { EXPECT_THROW(ResolveThreads(-1), Error); }

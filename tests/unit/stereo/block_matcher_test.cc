@@ -1,14 +1,14 @@
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <opencv2/calib3d.hpp>
 #include <string>
 #include <vector>
 
-#include <sgf/metrics/registry.h>
-#include <sgf/stereo/block_matcher.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <opencv2/calib3d.hpp>
 #include <support/error_message.h>
 #include <support/stereo_images.h>
+
+#include <sgf/metrics/registry.h>
+#include <sgf/stereo/block_matcher.h>
 
 namespace sgf::stereo {
 namespace {
@@ -26,8 +26,10 @@ BlockMatcherOptions With(const std::string& metric) {
   return options;
 }
 
-// Share of the pixels whose disparity is within a tolerance, of those at least 24 px from the border.
-double ShareWithin(const BlockMatcherOptions& options, const cv::Mat1s& disparity, double truth, double tolerance) {
+// Share of the pixels whose disparity is within a tolerance, of those at least 24 px from the
+// border.
+double ShareWithin(const BlockMatcherOptions& options, const cv::Mat1s& disparity, double truth,
+                   double tolerance) {
   const cv::Mat1f values = BlockMatcher(options).ToFloat(disparity);
   const cv::Mat1f inner = values(cv::Rect(24, 12, values.cols - 36, values.rows - 24));
   int good = 0;
@@ -50,7 +52,8 @@ TEST_P(EveryMetricTest, FindsTheDisparityOfAShiftedTexture) {
   const auto [left, right] = ShiftedPair({120, 60}, 7, 1);
   // ngf and ugf are not 0 at equality: they prefer strong edges nearby (Fig. 3 of the paper).
   const bool prefers_strong_edges = GetParam() == "ngf" || GetParam() == "ugf";
-  EXPECT_GT(ShareWithin(options, Compute(options, left, right), 7, 0.5), prefers_strong_edges ? 0.7 : 0.999);
+  EXPECT_GT(ShareWithin(options, Compute(options, left, right), 7, 0.5),
+            prefers_strong_edges ? 0.7 : 0.999);
 }
 
 TEST_P(EveryMetricTest, GivesTheSameBitsForAnyNumberOfThreads) {
@@ -96,7 +99,8 @@ TEST(BlockMatcher, FindsTheSameUnderGainAndOffsetOfOneImage) {
   left.convertTo(original, CV_32F);
   BlockMatcherOptions options = With("sgf");
   const cv::Mat1s expected = Compute(options, left, right);
-  EXPECT_LT(cv::norm(Compute(options, original, changed), expected, cv::NORM_L1) / expected.total(), 0.02);
+  EXPECT_LT(cv::norm(Compute(options, original, changed), expected, cv::NORM_L1) / expected.total(),
+            0.02);
   options.metric = "sad";
   EXPECT_LT(ShareWithin(options, Compute(options, original, changed), 7.4, 0.5), 0.5);
 }
@@ -151,7 +155,9 @@ TEST(BlockMatcher, DropsSpeckles) {
   ShiftedPair({9, 9}, 0, 4).first.copyTo(right(cv::Rect(45, 30, 9, 9)));  // at disparity 15
   BlockMatcherOptions options = With("sgf");
   options.window = 5;
-  const auto is_speckle = [&] { return std::abs(Compute(options, left, right)(34, 64) - 16 * 15) < 8; };
+  const auto is_speckle = [&] {
+    return std::abs(Compute(options, left, right)(34, 64) - 16 * 15) < 8;
+  };
   EXPECT_TRUE(is_speckle());
   options.speckle_window = 300;
   EXPECT_FALSE(is_speckle());
@@ -178,12 +184,15 @@ TEST(BlockMatcher, RejectsImagesThatDoNotFit) {
   const cv::Mat good(30, 40, CV_8U, cv::Scalar(0));
   EXPECT_EQ(message(cv::Mat(), good), "left image: image is empty");
   EXPECT_EQ(message(good, cv::Mat(30, 40, CV_8UC3)), "right image: expected one channel, got 3");
-  EXPECT_EQ(message(good, cv::Mat(30, 41, CV_8U)), "right image: is 41x30 CV_8UC1, the left image 40x30 CV_8UC1");
-  EXPECT_EQ(message(good, cv::Mat(30, 40, CV_32F)), "right image: is 40x30 CV_32FC1, the left image 40x30 CV_8UC1");
+  EXPECT_EQ(message(good, cv::Mat(30, 41, CV_8U)),
+            "right image: is 41x30 CV_8UC1, the left image 40x30 CV_8UC1");
+  EXPECT_EQ(message(good, cv::Mat(30, 40, CV_32F)),
+            "right image: is 40x30 CV_32FC1, the left image 40x30 CV_8UC1");
   EXPECT_EQ(message(cv::Mat(30, 40, CV_8S), good), "left image: unsupported pixel type CV_8SC1");
   EXPECT_EQ(message(cv::Mat(30, 20, CV_8U), cv::Mat(30, 20, CV_8U)),
             "num_disparities: 24 exceeds the image's width of 20");
-  EXPECT_EQ(message(cv::Mat(8, 40, CV_8U), cv::Mat(8, 40, CV_8U)), "window: 9 exceeds the image of 40x8");
+  EXPECT_EQ(message(cv::Mat(8, 40, CV_8U), cv::Mat(8, 40, CV_8U)),
+            "window: 9 exceeds the image of 40x8");
   EXPECT_TRUE(out.empty());
 }
 

@@ -1,11 +1,13 @@
 // The row kernels against the plainest definition, bit by bit, on every instruction set.
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <functional>
 #include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <support/reference_matcher.h>
+#include <support/stereo_images.h>
 
 #include <sgf/core/simd.h>
 #include <sgf/metrics/fixed_point.h>
@@ -13,8 +15,6 @@
 #include <sgf/metrics/sample_image.h>
 #include <sgf/stereo/band.h>
 #include <sgf/stereo/block_matcher.h>
-#include <support/reference_matcher.h>
-#include <support/stereo_images.h>
 
 namespace sgf::stereo {
 namespace {
@@ -48,7 +48,10 @@ const Case kCases[] = {
     {"parabola", [](auto& o) { o.subpixel = Subpixel::kParabola; }},
     {"central_differences", [](auto& o) { o.gradient = GradientOperator::kCentral; }},
     {"large_tau", [](auto& o) { o.tau = 0.05; }},
-    {"tiles", [](auto& o) { o.epsilon = {metrics::EpsilonScope::kTile, 16}; }},
+    {"tiles",
+     [](auto& o) {
+       o.epsilon = {metrics::EpsilonScope::kTile, 16};
+     }},
     {"noise_floor", [](auto& o) { o.epsilon.noise_floor = 50; }},
 };
 
@@ -60,11 +63,13 @@ BlockMatcherOptions OptionsOf(const Case& c) {
   return options;
 }
 
-std::vector<metrics::FixedSample> FixedSamples(const cv::Mat& image, const BlockMatcherOptions& o, int scale) {
+std::vector<metrics::FixedSample> FixedSamples(const cv::Mat& image, const BlockMatcherOptions& o,
+                                               int scale) {
   const auto samples = metrics::MakeSampleImage(image, o.gradient, o.epsilon, o.tau);
   std::vector<metrics::FixedSample> fixed;
   for (int y = 0; y < image.rows; ++y)
-    for (int x = 0; x < image.cols; ++x) fixed.push_back(metrics::QuantizeSample(samples.At(y, x), scale));
+    for (int x = 0; x < image.cols; ++x)
+      fixed.push_back(metrics::QuantizeSample(samples.At(y, x), scale));
   return fixed;
 }
 
@@ -79,7 +84,8 @@ int64_t WindowSum(cv::Size size, int window, int x, int y, int disparity, Cost c
   return sum;
 }
 
-cv::Mat1s ReferenceSgf(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {
+cv::Mat1s ReferenceSgf(const cv::Mat& left, const cv::Mat& right,
+                       const BlockMatcherOptions& options) {
   const int scale = internal::SgfCostScale(options.window);
   const auto l = FixedSamples(left, options, scale), r = FixedSamples(right, options, scale);
   const auto cost = [&](int y, int x, int x_right) {
@@ -159,8 +165,8 @@ TEST(SgfKernel, SumsOfTheLargestCostsFitTheirLanes) {
 
 // The general kernel, on the dissimilarities that take other paths to their costs.
 template <class Cost>
-void ExpectGeneralKernelEquals(const BlockMatcherOptions& options, const cv::Mat& left, const cv::Mat& right,
-                               Cost cost) {
+void ExpectGeneralKernelEquals(const BlockMatcherOptions& options, const cv::Mat& left,
+                               const cv::Mat& right, Cost cost) {
   const ReferenceMatcher matcher(left.size(), options, [&](int x, int y, int disparity) {
     return WindowSum(left.size(), options.window, x, y, disparity, cost);
   });
@@ -203,16 +209,17 @@ TEST(WindowKernel, TakesTheDissimilarityOfTheWholeWindow) {
   const auto [left, right] = MixedPair();
   const auto l = metrics::MakeSampleImage(left, options.gradient, options.epsilon);
   const auto r = metrics::MakeSampleImage(right, options.gradient, options.epsilon);
-  const ReferenceMatcher matcher(left.size(), options, [&, size = left.size()](int x, int y, int disparity) {
-    metrics::Zncc::Sums<double> sums;
-    WindowSum(size, options.window, x, y, disparity, [&](int v, int u, int u_right) {
-      const auto i = l.At(v, u), j = r.At(v, u_right);
-      sums.Add(metrics::MakeSample<double>(i.intensity, i.gx, i.gy, 1),
-               metrics::MakeSample<double>(j.intensity, j.gx, j.gy, 1));
-      return 0;
-    });
-    return static_cast<int64_t>(16383 * static_cast<float>(metrics::Zncc{}.Value(sums)) + 0.5F);
-  });
+  const ReferenceMatcher matcher(
+      left.size(), options, [&, size = left.size()](int x, int y, int disparity) {
+        metrics::Zncc::Sums<double> sums;
+        WindowSum(size, options.window, x, y, disparity, [&](int v, int u, int u_right) {
+          const auto i = l.At(v, u), j = r.At(v, u_right);
+          sums.Add(metrics::MakeSample<double>(i.intensity, i.gx, i.gy, 1),
+                   metrics::MakeSample<double>(j.intensity, j.gx, j.gy, 1));
+          return 0;
+        });
+        return static_cast<int64_t>(16383 * static_cast<float>(metrics::Zncc{}.Value(sums)) + 0.5F);
+      });
   cv::Mat1s disparity;
   BlockMatcher(options).Compute(left, right, disparity);
   EXPECT_EQ(Differences(disparity, matcher.Disparity()), 0);

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
+#include <support/stereo_images.h>
 
 #include <sgf/stereo/prefilter.h>
-#include <support/stereo_images.h>
 
 namespace sgf::stereo {
 namespace {
@@ -33,7 +33,9 @@ TEST(Prefilter, NormalizedResponseIgnoresOffsetsAndKeepsContrast) {
   EXPECT_EQ(filtered(7, 7), 31 + 8);
   EXPECT_EQ(filtered(0, 0), 31);
   const cv::Mat1b brighter = image + 50;
-  EXPECT_EQ(cv::countNonZero(ApplyPrefilter(brighter, With(Prefilter::kNormalizedResponse)) != filtered), 0);
+  EXPECT_EQ(
+      cv::countNonZero(ApplyPrefilter(brighter, With(Prefilter::kNormalizedResponse)) != filtered),
+      0);
 }
 
 TEST(Prefilter, StaysWithinTheCap) {

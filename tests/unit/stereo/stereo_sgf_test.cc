@@ -1,10 +1,9 @@
 #include <gtest/gtest.h>
-
 #include <opencv2/calib3d.hpp>
+#include <support/stereo_images.h>
 
 #include <sgf/core/error.h>
 #include <sgf/stereo/stereo_sgf.h>
-#include <support/stereo_images.h>
 
 namespace sgf {
 namespace {
@@ -12,7 +11,8 @@ namespace {
 TEST(StereoSgf, SwapsInForStereoBmThroughTheSameInterface) {
   const auto [left, right] = ShiftedPair({160, 60}, 11, 1);
   for (const cv::Ptr<cv::StereoMatcher>& matcher :
-       {cv::Ptr<cv::StereoMatcher>(cv::StereoBM::create(32, 9)), cv::Ptr<cv::StereoMatcher>(StereoSgf::create(32, 9))}) {
+       {cv::Ptr<cv::StereoMatcher>(cv::StereoBM::create(32, 9)),
+        cv::Ptr<cv::StereoMatcher>(StereoSgf::create(32, 9))}) {
     cv::Mat disparity;
     matcher->compute(left, right, disparity);
     ASSERT_EQ(disparity.type(), CV_16SC1);

@@ -1,0 +1,38 @@
+# The whole reproduction in one image: packages and Release build at `docker build`, experiments at `docker run`.
+#
+#   docker build -t sgf .
+#   docker run --rm --user "$(id -u):$(id -g)" \
+#     -v "$PWD/results:/opt/beyond-photometric/results" \
+#     -v /path/to/datasets:/data:ro sgf --data /data
+#
+# The second mount and `--data` are optional. Arguments are those of reproduce.sh; `test` runs the tests.
+# Results go to the first mount, best the results/ folder of a clone: it also holds the reference files
+# that the tests compare with.
+ARG BASE=debian:bookworm-slim
+FROM ${BASE}
+
+# Slim images leave /usr/share/doc out of every installation; one real stereo pair lives there.
+COPY packages.apt /tmp/packages.apt
+RUN echo 'path-include /usr/share/doc/opencv-doc/examples/data/aloe*' > /etc/dpkg/dpkg.cfg.d/zz-stereo-pair \
+ && apt-get update \
+ && awk '{ sub(/#.*/, "") } /^\[/ { wanted = /^\[(run|report|test)\]/; next } wanted && NF { print $1 }' \
+      /tmp/packages.apt \
+    | DEBIAN_FRONTEND=noninteractive xargs apt-get install -y --no-install-recommends \
+ && rm -rf /var/lib/apt/lists/* /tmp/packages.apt \
+ && useradd --create-home --uid 1000 sgf \
+ && install -d -o sgf -g sgf /opt/beyond-photometric
+
+USER sgf
+WORKDIR /opt/beyond-photometric
+COPY --chown=sgf:sgf . .
+
+# Any user id may run the image (--user): everything is writable to all, the home is /tmp, and the one file whose
+# mode CMake sets, which only its owner may do, is left for the run to make anew.
+ENV HOME=/tmp USER=sgf
+RUN cmake --preset release \
+ && cmake --build --preset release \
+ && rm build/release/provenance.cc \
+ && mkdir -p results datasets/generated \
+ && chmod -R a+rwX .
+
+ENTRYPOINT ["./reproduce.sh"]

@@ -1,0 +1,215 @@
+"""Makes experiments of paper/experiments: data sets, then Snakemake, then a summary.
+
+What is up to date is not made again, an interrupted run goes on where it stopped, and a failed job
+names its log. Exit code 0 if every stage that has data was made, 130 if interrupted, else 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+
+from sgf_paper import config, summary
+from sgf_paper.config import Dataset, Experiment
+from sgf_paper.progress import clock
+
+PYTHON = "/usr/bin/python3"  # Debian's, which has Snakemake; another may stand first on the PATH
+
+
+class RunError(Exception):
+    """Why a run cannot go on."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Folders (absolute) and the number of parallel jobs."""
+
+    bin: Path
+    results: Path
+    data: str  # empty: no downloaded data sets
+    generated: Path
+    jobs: int
+
+    @property
+    def logs(self) -> Path:
+        return self.results / "logs"
+
+
+def lock(results: Path) -> int:
+    """Takes the results folder for this process and those it starts.
+
+    @returns the open file that holds the lock; the kernel drops it when the last holder ends.
+    """
+    descriptor = os.open(results / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise RunError(f"another run is at work in {results}") from error
+    return descriptor
+
+
+def make_debian_pairs(settings: Settings) -> None:
+    """Converts the pairs that Debian packages ship; says so and goes on where they are left out."""
+    script = config.PROJECT / "datasets" / "debian_pairs.py"
+    out = settings.generated / "debian_pairs"
+    done = subprocess.run([PYTHON, script, out], capture_output=True, text=True)
+    (settings.logs / "debian_pairs.log").write_text(done.stdout + done.stderr)
+    for line in (done.stdout + done.stderr).splitlines():
+        print(f"  {line}", flush=True)
+
+
+def find_datasets(settings: Settings) -> dict[str, Dataset]:
+    """Has sgf_eval list the data sets at hand and keeps the list as results/datasets.tsv."""
+    log = settings.logs / "datasets.log"
+    flags = config.dataset_flags(settings.data, str(settings.generated))
+    with log.open("w") as errors:
+        command = [settings.bin / "sgf_eval", "datasets", *flags]
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=errors, text=True)
+    if done.returncode:
+        raise RunError(f"data sets cannot be listed: {log.read_text().strip()} (log: {log})")
+    listing = settings.results / "datasets.tsv"
+    listing.write_text(done.stdout)
+    return config.read_datasets(listing)
+
+
+def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
+    """Whether any data set that a stage can use is at hand."""
+    if stage.kind == "table":
+        return bool(stage.present(datasets))
+    if stage.kind == "density":
+        return any(config.load_experiment(table).present(datasets) for table in stage.tables)
+    if stage.kind == "disparity_figure":
+        return stage.group(datasets) is not None
+    return stage.pair(datasets) is not None
+
+
+def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str]:
+    values = {
+        "stages": " ".join(stage.name for stage in stages),
+        "bin": settings.bin,
+        "data": settings.data,
+        "generated": settings.generated,
+    }
+    return [
+        PYTHON, "-m", "snakemake",
+        "--snakefile", str(config.PAPER / "Snakefile"),
+        "--directory", str(settings.results),
+        "--cores", str(settings.jobs),
+        "--scheduler", "greedy",
+        "--nolock",  # lock() does it, without stale locks after a crash
+        "--rerun-incomplete",
+        "--keep-going",
+        "--log-handler-script", str(config.PAPER / "sgf_paper" / "progress.py"),
+        "--config", *(f"{key}={value}" for key, value in values.items()),
+    ]  # fmt: skip
+
+
+def _environment(results: Path) -> dict[str, str]:
+    """Caches of Snakemake and matplotlib go to the results: the home may not be writable."""
+    cache = results / ".cache"
+    folders = {"XDG_CACHE_HOME": str(cache), "MPLCONFIGDIR": str(cache / "matplotlib")}
+    return {**os.environ, **folders}
+
+
+def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int) -> bool:
+    """Runs Snakemake; its own text goes to a log, progress lines to the standard output."""
+    log = settings.logs / "snakemake.log"
+    with log.open("w") as errors:
+        command = _snakemake_command(settings, stages)
+        child = subprocess.Popen(
+            command, stderr=errors, pass_fds=[lock_file], env=_environment(settings.results)
+        )
+        try:
+            code = child.wait()
+        except KeyboardInterrupt:
+            child.send_signal(signal.SIGINT)
+            child.wait()  # it stops its jobs and removes what they left half-written
+            raise
+    if code:
+        print(f"  Some stages failed; details: {log}", flush=True)
+    return code == 0
+
+
+def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
+    """Makes the stages and prints what came of it; true if nothing failed."""
+    started = time.time()
+    settings.logs.mkdir(parents=True, exist_ok=True)
+    lock_file = lock(settings.results)
+    print("== data sets", flush=True)
+    make_debian_pairs(settings)
+    datasets = find_datasets(settings)
+    for dataset in datasets.values():
+        print(f"  {dataset.name}: {dataset.scenes} scenes in {dataset.folder}", flush=True)
+    runnable = [stage for stage in stages if has_data(stage, datasets)]
+    if not runnable:
+        raise RunError("no data set at hand for any stage; see the lines above, or give --data")
+    print(f"== experiments: {' '.join(stage.name for stage in runnable)}", flush=True)
+    passed = run_snakemake(settings, runnable, lock_file)
+    print_summary(settings, stages, runnable, datasets, started)
+    return passed
+
+
+def print_summary(
+    settings: Settings,
+    stages: list[Experiment],
+    runnable: list[Experiment],
+    datasets: dict[str, Dataset],
+    started: float,
+) -> None:
+    """Ends a run: what was made, where it lies, what was measured, what was absent."""
+    print(f"== summary ({clock(time.time() - started)}; all files in {settings.results})")
+    for stage in stages:
+        if stage in runnable:
+            print("\n".join(summary.stage_lines(stage, settings.results, started)))
+        else:
+            print(f"  {stage.name:14} left out: its data are not at hand")
+    absent = summary.absent_datasets(stages, datasets)
+    print("  Data sets absent: " + ("; ".join(absent) if absent else "none"), flush=True)
+
+
+def parse_arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="sgf_paper.run", description=__doc__)
+    parser.add_argument("--bin", type=Path, required=True, help="folder of the programs")
+    parser.add_argument("--results", type=Path, default=config.PROJECT / "results")
+    parser.add_argument("--generated", type=Path, default=config.PROJECT / "datasets" / "generated")
+    parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
+    parser.add_argument("stages", nargs="+", help="names of experiments")
+    return parser.parse_args()
+
+
+def _interrupt(*_: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def main() -> int:
+    arguments = parse_arguments()
+    signal.signal(signal.SIGTERM, _interrupt)
+    settings = Settings(
+        bin=arguments.bin.resolve(),
+        results=arguments.results.resolve(),
+        data=str(Path(arguments.data).resolve()) if arguments.data else "",
+        generated=arguments.generated.resolve(),
+        jobs=arguments.jobs,
+    )
+    try:
+        stages = [config.load_experiment(name) for name in arguments.stages]
+        return 0 if make_stages(settings, stages) else 1
+    except (RunError, config.ConfigError) as error:
+        print(f"Error: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("Interrupted; the same command goes on from here.", file=sys.stderr)
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,89 @@
+"""What a run made, where it lies and what it measured, in a few lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from sgf_paper import bench, config
+from sgf_paper.config import Dataset, Experiment
+
+FILES = {
+    "table": "tables/{}.md (.csv, .tex, _scenes.csv, _wins.csv, _tuned.csv)",
+    "density": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _equal.csv)",
+    "disparity_figure": "figures/{}.png (.pdf)",
+    "benchmark": "tables/{}.md (.csv)",
+}
+MAIN_FILE = {
+    "table": "tables/{}.csv",
+    "density": "figures/{}.png",
+    "disparity_figure": "figures/{}.png",
+    "benchmark": "tables/{}.csv",
+}
+
+
+def main_file(stage: Experiment, results: Path) -> Path:
+    """The file whose presence and time say whether and when a stage was made."""
+    return results / MAIN_FILE[stage.kind].format(stage.name)
+
+
+def _table_lines(path: Path) -> list[str]:
+    """Per data set and region the paper's columns by mean error."""
+    frame = pd.read_csv(path)
+    main = config.load_sweep(config.load_experiment(path.stem).sweep).main_columns
+    measured = frame[frame["measured"].notna() & frame["cost"].isin(main)]
+    lines = []
+    for (dataset, region), block in measured.groupby(["dataset", "region"], sort=False):
+        wide = block.pivot(index="cost", columns="quantity", values="measured")
+        order = wide.sort_values("mean_px")
+        texts = [f"{cost} {row.mean_px:.2f}" for cost, row in order.iterrows()]
+        best = order.iloc[0]
+        lines.append(
+            f"{dataset} {region}, {block['scenes'].max()} scenes, mean px: {', '.join(texts)};"
+            f" {order.index[0]}: bad 2 {best.bad2_pct:.1f} %, invalid {best.invalid_pct:.1f} %"
+        )
+    return lines
+
+
+def _bench_lines(path: Path) -> list[str]:
+    speeds = pd.read_csv(path)
+    lines = [
+        f"{row.case}: sgf {row.ratio:.2f} times cv::StereoBM ({row.isa}, 1 thread)"
+        for row in bench.ratios_to_opencv(speeds).itertuples()
+    ]
+    scaling = bench.scaling(speeds)
+    lines += [
+        f"{row.case}: sgf on {row.threads} threads {row.ratio:.2f} times 1 thread ({row.isa})"
+        for row in scaling[scaling["implementation"] == "sgf_bm"].itertuples()
+    ]
+    return lines
+
+
+def _measured(stage: Experiment, results: Path) -> list[str]:
+    if stage.kind == "table":
+        return _table_lines(main_file(stage, results))
+    if stage.kind == "benchmark":
+        return _bench_lines(main_file(stage, results))
+    return []
+
+
+def stage_lines(stage: Experiment, results: Path, started: float) -> list[str]:
+    """Lines on one stage; `started` is when the run began, in seconds of the epoch."""
+    path = main_file(stage, results)
+    if not path.exists():
+        return [f"  {stage.name:14} NOT MADE"]
+    state = "made" if path.stat().st_mtime >= started else "up to date"
+    head = f"  {stage.name:14} {state:11} {FILES[stage.kind].format(stage.name)}"
+    return [head, *(f"    {line}" for line in _measured(stage, results))]
+
+
+def absent_datasets(stages: list[Experiment], datasets: dict[str, Dataset]) -> list[str]:
+    """Data sets that the stages would use and that were not found, each with its source."""
+    wanted = []
+    for stage in stages:
+        if stage.kind == "table":
+            wanted += stage.datasets
+    catalogue = config.read_yaml(config.CATALOGUE)
+    missing = [name for name in dict.fromkeys(wanted) if name not in datasets]
+    return [f"{name} ({', '.join(catalogue[name]['source'])})" for name in missing]

@@ -1,0 +1,132 @@
+"""The tables as text: CSV files, and blocks of formatted cells that the templates lay out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import jinja2
+import pandas as pd
+
+from sgf_paper import config
+
+LABELS = {
+    "mean_px": "mean px",
+    "median_px": "median px",
+    "bad1_pct": "bad 1 %",
+    "bad2_pct": "bad 2 %",
+    "bad4_pct": "bad 4 %",
+    "d1_pct": "D1 %",
+    "invalid_pct": "invalid %",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One quantity of one column as text; empty where there is no value."""
+
+    measured: str
+    published: str
+    best: bool
+
+
+@dataclass(frozen=True)
+class Row:
+    cost: str
+    extra: bool
+    cells: list[Cell]
+    won: str  # "scenes won/scenes", empty where not counted
+
+
+@dataclass(frozen=True)
+class Block:
+    """The lines of one data set and region."""
+
+    dataset: str
+    region: str
+    scenes: int
+    rows: list[Row]
+
+
+def format_number(value: float, decimals: int) -> str:
+    """The number with so many decimals, empty for NaN."""
+    return "" if value != value else f"{value:.{decimals}f}"
+
+
+def write_csv(frame: pd.DataFrame, path: Path) -> None:
+    """Writes a CSV file with numbers of four decimals; the paper's values as printed there."""
+    shown = frame.copy()
+    for name in shown.columns[shown.dtypes == float]:
+        decimals = 2 if name == "published" else 4
+        shown[name] = [format_number(value, decimals) for value in shown[name]]
+    shown.to_csv(path, index=False)
+
+
+def _best(block: pd.DataFrame, main: list[str]) -> dict[str, float]:
+    """Least measured value of each error among the paper's columns."""
+    errors = block[block["cost"].isin(main) & (block["quantity"] != "invalid_pct")]
+    return errors.groupby("quantity")["measured"].min().to_dict()
+
+
+def _cell(values: pd.DataFrame, quantity: str, best: dict[str, float]) -> Cell:
+    if quantity not in values.index:
+        return Cell("", "", False)
+    measured, published = values.loc[quantity, ["measured", "published"]]
+    is_best = measured == best.get(quantity)
+    return Cell(format_number(measured, 2), format_number(published, 2), is_best)
+
+
+def _won(wins: pd.DataFrame, cost: str) -> str:
+    """Scenes won in mean error."""
+    line = wins[(wins["cost"] == cost) & (wins["quantity"] == "mean_px")]
+    return "" if line.empty else f"{line['won'].item()}/{line['scenes'].item()}"
+
+
+def make_blocks(
+    frame: pd.DataFrame, wins: pd.DataFrame, quantities: list[str], main: list[str]
+) -> list[Block]:
+    """Cuts a table's lines into one block per data set and region.
+
+    @param wins scenes won per column; may be empty.
+    @param main the paper's own columns.
+    """
+    blocks = []
+    for (dataset, region), block in frame.groupby(["dataset", "region"], sort=False):
+        best = _best(block, main)
+        own_wins = wins[(wins["dataset"] == dataset) & (wins["region"] == region)]
+        rows = []
+        for cost, lines in block.groupby("cost", sort=False):
+            values = lines.set_index("quantity")
+            cells = [_cell(values, quantity, best) for quantity in quantities]
+            rows.append(Row(cost, cost not in main, cells, _won(own_wins, cost)))
+        blocks.append(Block(dataset, region, int(block["scenes"].max()), rows))
+    return blocks
+
+
+def flatten(options: dict, prefix: str = "") -> list[str]:
+    """A map of options as texts `key value`, nested keys dotted."""
+    texts = []
+    for key, value in options.items():
+        nested = isinstance(value, dict)
+        texts += flatten(value, f"{prefix}{key}.") if nested else [f"{prefix}{key} {value}"]
+    return texts
+
+
+def _latex(text: object) -> str:
+    escaped = str(text)
+    for character in "&%$#_{}":
+        escaped = escaped.replace(character, "\\" + character)
+    return escaped
+
+
+def render(template: str, **context: object) -> str:
+    """Fills a template of paper/templates."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(config.PAPER / "templates"),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters["latex"] = _latex
+    return environment.get_template(template).render(**context)

@@ -1,0 +1,256 @@
+#!/usr/bin/env bash
+# From a fresh Debian 12 machine to every table and figure (./reproduce.sh), or through the whole
+# test suite (./reproduce.sh test). Never asks anything. Exit code 0: done; 1: a step failed and said
+# where its log is; 2: wrong usage.
+set -euo pipefail
+
+caller=$PWD
+cd -- "$(dirname -- "${BASH_SOURCE[0]}")"
+project=$PWD
+logs=$project/results/logs
+bin=$project/build/release/bin
+
+# Debian's Python with Debian's packages, whatever else the caller has installed or set.
+python=/usr/bin/python3
+unset PYTHONPATH PYTHONHOME
+export PYTHONNOUSERSITE=1
+
+usage() {
+  cat <<'END'
+Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the experiments
+       ./reproduce.sh test [OPTION]...   the same set-up, then the whole test suite
+
+  --only NAME...  only these experiments (see --list)
+  --data DIR      folder with downloaded data sets; default: environment variable SGF_DATA, or none.
+                  Without it the pairs that Debian packages ship are used.
+  --jobs N        parallel jobs; default: the number of processors
+  --list          list the experiments and stop
+  --clean         remove what was built and generated (not results/reference) and stop
+  --help          show this text and stop
+
+Results: results/tables, results/figures; logs: results/logs. What is up to date is not made again,
+and an interrupted run goes on where it stopped.
+END
+}
+
+wrong_usage() {
+  printf 'reproduce.sh: %s (see --help)\n' "$1" >&2
+  exit 2
+}
+
+fail() {
+  printf 'Error: %s\n' "$1" >&2
+  exit 1
+}
+
+# --- experiments ---------------------------------------------------------------------------------
+
+experiment_names() {
+  local file
+  for file in paper/experiments/*.yaml; do
+    basename "$file" .yaml
+  done
+}
+
+list_experiments() {
+  local name title
+  for name in $(experiment_names); do
+    title=$(sed -n 's/^title: *"\(.*\)" *$/\1/p' "paper/experiments/$name.yaml")
+    printf '%-14s %s\n' "$name" "$title"
+  done
+}
+
+require_experiment() {
+  [[ $1 != */* && -f paper/experiments/$1.yaml ]] ||
+    wrong_usage "unknown experiment '$1'; known: $(experiment_names | paste -sd ' ')"
+}
+
+# --- packages ------------------------------------------------------------------------------------
+
+# packages_of SECTION...: the packages of these sections of packages.apt, one a line.
+packages_of() {
+  awk -v wanted=" $* " '
+    { sub(/#.*/, ""); gsub(/[ \t]+/, "") }
+    /^\[.*\]$/ { section = substr($0, 2, length($0) - 2); next }
+    $0 != "" && index(wanted, " " section " ") { print }' packages.apt
+}
+
+# missing_packages SECTION...: those of them that are not installed.
+missing_packages() {
+  local package
+  for package in $(packages_of "$@"); do
+    [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] ||
+      printf '%s\n' "$package"
+  done
+}
+
+# print_manual_install PACKAGE...: what to do without the right to install.
+print_manual_install() {
+  cat >&2 <<END
+These packages are missing, and installing needs root or sudo without a password:
+
+  sudo apt-get update && sudo apt-get install -y --no-install-recommends $*
+
+Or run everything in a container:
+
+  docker build -t beyond-photometric .
+  docker run --rm --user "\$(id -u):\$(id -g)" \\
+    -v "\$PWD/results:/opt/beyond-photometric/results" beyond-photometric
+END
+}
+
+# apt-get as root, with its output in a log.
+apt_get() {
+  local -a command=(env DEBIAN_FRONTEND=noninteractive apt-get -y -o DPkg::Lock::Timeout=600 "$@")
+  [[ $(id -u) -eq 0 ]] || command=(sudo -n "${command[@]}")
+  "${command[@]}" >>"$logs/packages.log" 2>&1 </dev/null ||
+    fail "apt-get $1 failed; log: $logs/packages.log"
+}
+
+install_packages() {
+  local -a missing
+  command -v dpkg-query >/dev/null ||
+    fail "this is not a Debian system; use the Dockerfile, or install what packages.apt lists"
+  mapfile -t missing < <(missing_packages "$@")
+  if ((${#missing[@]} == 0)); then
+    printf '  all of%s are installed\n' "$(printf ' [%s]' "$@")"
+    return
+  fi
+  if [[ $(id -u) -ne 0 ]] && ! sudo -n true 2>/dev/null; then
+    print_manual_install "${missing[@]}"
+    exit 1
+  fi
+  printf '  installing %d: %s\n' "${#missing[@]}" "${missing[*]}"
+  : >"$logs/packages.log"
+  apt_get update
+  apt_get install --no-install-recommends "${missing[@]}"
+}
+
+# --- build ---------------------------------------------------------------------------------------
+
+# Turns Ninja's lines into one progress line per tenth; keeps all of them in the log $1.
+build_progress() {
+  awk -v log_file="$1" '
+    function clock(s) { return sprintf("%d:%02d", s / 60, s % 60) }
+    { print > log_file }
+    match($0, /^\[[0-9]+\/[0-9]+ [0-9.]+\]/) {
+      split(substr($0, 2, RLENGTH - 2), part, /[\/ ]/)
+      done = part[1]; total = part[2]; elapsed = part[3]
+      if (int(10 * done / total) > tenth) {
+        tenth = int(10 * done / total)
+        printf "  [%d/%d] elapsed %s, about %s left\n", done, total, clock(elapsed),
+          clock(elapsed * (total - done) / done)
+        fflush()
+      }
+    }'
+}
+
+# build TESTS [TARGET...]: configures (TESTS: ON or OFF) and builds the targets, or all.
+build() {
+  local tests=$1 log=$logs/build.log
+  shift
+  cmake --preset release "-DSGF_BUILD_TESTS=$tests" >"$logs/configure.log" 2>&1 || {
+    tail -n 20 "$logs/configure.log" >&2
+    fail "configuring failed; log: $logs/configure.log"
+  }
+  NINJA_STATUS='[%f/%t %e] ' cmake --build --preset release --parallel "$jobs" ${1+--target "$@"} 2>&1 |
+    build_progress "$log" || {
+    grep -m 5 -A 5 'error' "$log" >&2 || tail -n 20 "$log" >&2
+    fail "building failed; log: $log"
+  }
+  printf '  built in %s\n' "$project/build/release"
+}
+
+# Whether the build folder was configured with tests: a developer's stays so.
+tests_in_build() {
+  grep -qs '^SGF_BUILD_TESTS:BOOL=ON$' build/release/CMakeCache.txt && echo ON || echo OFF
+}
+
+# --- commands ------------------------------------------------------------------------------------
+
+clean() {
+  rm -rf build/release datasets/generated
+  find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + 2>/dev/null || true
+  echo "Removed build/release, datasets/generated and all of results but results/reference."
+}
+
+run_experiments() {
+  echo "== packages [run] [report]"
+  install_packages run report
+  echo "== build"
+  build "$(tests_in_build)" sgf_eval sgf_stereo stereo_bench
+  cd paper
+  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${stages[@]}"
+}
+
+run_tests() {
+  echo "== packages [run] [report] [test]"
+  install_packages run report test
+  echo "== build"
+  build ON
+  echo "== tests"
+  if [[ -n $data ]]; then export SGF_DATA=$data; fi
+  exec ctest --preset release --parallel "$jobs"
+}
+
+# --- command line --------------------------------------------------------------------------------
+
+mode=run
+stages=()
+data=${SGF_DATA:-}
+jobs=$(nproc)
+
+while (($#)); do
+  case $1 in
+    test) mode="test" ;;
+    --only)
+      while (($# > 1)) && [[ $2 != -* && $2 != test ]]; do
+        require_experiment "$2"
+        stages+=("$2")
+        shift
+      done
+      ((${#stages[@]})) || wrong_usage "--only needs the name of an experiment"
+      ;;
+    --data)
+      (($# > 1)) || wrong_usage "--data needs a folder"
+      data=$2
+      shift
+      ;;
+    --jobs)
+      [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || wrong_usage "--jobs needs a positive number, not '${2:-}'"
+      jobs=$2
+      shift
+      ;;
+    --list | --clean) mode=${1#--} ;;
+    --help)
+      usage
+      exit 0
+      ;;
+    *) wrong_usage "unknown option '$1'" ;;
+  esac
+  shift
+done
+
+if [[ $mode == test && ${#stages[@]} -gt 0 ]]; then
+  wrong_usage "--only chooses experiments; it does not go with test"
+fi
+if [[ -n $data ]]; then
+  cd -- "$caller"
+  [[ -d $data ]] || wrong_usage "data folder '$data' does not exist"
+  data=$(realpath -- "$data")
+  cd -- "$project"
+fi
+((${#stages[@]})) || mapfile -t stages < <(experiment_names)
+
+case $mode in
+  list) list_experiments ;;
+  clean) clean ;;
+  run)
+    mkdir -p "$logs"
+    run_experiments
+    ;;
+  test)
+    mkdir -p "$logs"
+    run_tests
+    ;;
+esac

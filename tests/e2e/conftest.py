@@ -1,0 +1,118 @@
+"""Copies of the project in which reproduce.sh runs with stand-ins for the programs and for apt."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+HERE = Path(__file__).resolve().parent
+PROJECT = HERE.parent.parent
+
+
+def write_pair(folder):
+    """A tiny pair in Middlebury's layout; calib.txt comes last, as debian_pairs.py writes it."""
+    folder.mkdir(parents=True)
+    grey = Image.fromarray((np.arange(600) % 251).astype(np.uint8).reshape(20, 30))
+    for name in ("im0.png", "im1.png"):
+        grey.save(folder / name)
+    truth = np.linspace(1, 9, 600, dtype="<f4").tobytes()
+    (folder / "disp0GT.pfm").write_bytes(b"Pf\n30 20\n-1\n" + truth)
+    (folder / "calib.txt").write_text("width=30\nheight=20\nndisp=16\n")
+
+
+class Project:
+    """One copy of the project and ways to run its reproduce.sh."""
+
+    def __init__(self, root):
+        self.root = root / "a project"  # a blank, which paths must survive
+        self.log = root / "stub.log"
+        self.results = self.root / "results"
+        self.bin = self.root / "build" / "release" / "bin"
+        self.data = root / "my data"
+        self._copy()
+        for name in ("Motorcycle", "Aloe"):
+            write_pair(self.root / "datasets" / "generated" / "debian_pairs" / name)
+
+    def _copy(self):
+        ignore = shutil.ignore_patterns("__pycache__", "generated")
+        for folder in ("paper", "datasets"):
+            shutil.copytree(PROJECT / folder, self.root / folder, ignore=ignore)
+        for file in ("reproduce.sh", "packages.apt"):
+            shutil.copy2(PROJECT / file, self.root / file)
+
+    def environment(self, **more):
+        kept = {k: v for k, v in os.environ.items() if not k.startswith("SGF_")}
+        return {
+            **kept,
+            "PATH": f"{HERE / 'stubs'}:/usr/bin:/bin",
+            "FAKES": str(HERE / "fakes"),
+            "STUB_LOG": str(self.log),
+            "STUB_FAIL_BUILD": str(self.root / "fail_build"),
+            "PYTHONPATH": "/nonexistent",
+            **more,
+        }
+
+    def start(self, *arguments, **environment):
+        """Starts reproduce.sh as the leader of its own process group."""
+        return subprocess.Popen(
+            [self.root / "reproduce.sh", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            env=self.environment(**environment),
+            start_new_session=True,
+        )
+
+    def run(self, *arguments, **environment):
+        """Runs reproduce.sh; its exit code and what it printed."""
+        process = self.start(*arguments, **environment)
+        output, _ = process.communicate(timeout=240)
+        return process.returncode, output
+
+    def calls(self):
+        """`data set column` for each column that the stand-in for sgf_eval has scored."""
+        file = self.bin / "calls"
+        return file.read_text().splitlines() if file.exists() else []
+
+    def stub_log(self):
+        return self.log.read_text() if self.log.exists() else ""
+
+    def add_dataset(self, name, scenes):
+        for scene in scenes:
+            (self.data / name / scene).mkdir(parents=True)
+
+    def wait_for_calls(self, count):
+        """Waits until so many columns have begun."""
+        deadline = time.time() + 120
+        while len(self.calls()) < count:
+            assert time.time() < deadline, "no column was begun"
+            time.sleep(0.05)
+
+
+def stop(process, number):
+    """Sends a signal to a whole process group, as a terminal does, and waits for its end."""
+    os.killpg(process.pid, number)
+    output, _ = process.communicate(timeout=120)
+    return process.returncode, output
+
+
+@pytest.fixture
+def interrupt():
+    return lambda process: stop(process, signal.SIGINT)
+
+
+@pytest.fixture
+def kill():
+    return lambda process: stop(process, signal.SIGKILL)
+
+
+@pytest.fixture
+def project(tmp_path):
+    return Project(tmp_path)

@@ -1,0 +1,148 @@
+"""reproduce.sh: options, packages, build and the test command."""
+
+import re
+
+import pytest
+
+from conftest import PROJECT
+
+EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
+APT_LINE = "sudo apt-get update && sudo apt-get install -y --no-install-recommends "
+
+
+def sections():
+    """packages.apt read independently of reproduce.sh."""
+    found, section = {}, None
+    for line in (PROJECT / "packages.apt").read_text().splitlines():
+        line = line.split("#")[0].strip()
+        if match := re.fullmatch(r"\[(\w+)\]", line):
+            section = found.setdefault(match[1], [])
+        elif line:
+            section.append(line)
+    return found
+
+
+def test_the_four_sections_name_each_package_once():
+    found = sections()
+    assert list(found) == ["run", "report", "test", "dev"]
+    every = [package for packages in found.values() for package in packages]
+    assert len(every) == len(set(every))
+    assert all(re.fullmatch(r"[a-z0-9][a-z0-9+.-]+", package) for package in every)
+
+
+def test_help_and_list_need_nothing_built(project):
+    code, output = project.run("--help")
+    assert code == 0 and "--only NAME" in output and "./reproduce.sh test" in output
+    code, output = project.run("--list")
+    assert code == 0
+    assert [line.split()[0] for line in output.splitlines()] == EXPERIMENTS
+    assert all(len(line.split()) > 2 for line in output.splitlines())
+    assert project.stub_log() == "" and not project.results.exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["--fast"], "unknown option '--fast'"),
+        (["tests"], "unknown option 'tests'"),
+        (["--only"], "--only needs"),
+        (["--only", "--list"], "--only needs"),
+        (["--only", "table1", "table8"], "unknown experiment 'table8'; known: bench_stereo"),
+        (["--only", "../experiments/table1"], "unknown experiment"),
+        (["--jobs", "0"], "--jobs needs a positive number, not '0'"),
+        (["--jobs", "two"], "--jobs needs a positive number, not 'two'"),
+        (["--jobs"], "--jobs needs"),
+        (["--data"], "--data needs a folder"),
+        (["--data", "/nonexistent/data"], "data folder '/nonexistent/data' does not exist"),
+        (["test", "--only", "table1"], "does not go with test"),
+    ],
+)
+def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, message):
+    code, output = project.run(*arguments)
+    assert code == 2
+    assert message in output
+    assert project.stub_log() == "" and not project.results.exists()
+
+
+def test_a_data_folder_from_the_environment_must_exist(project):
+    code, output = project.run("--list", SGF_DATA="/nonexistent/data")
+    assert code == 2 and "'/nonexistent/data' does not exist" in output
+
+
+def test_without_root_and_sudo_the_apt_line_is_printed(project):
+    missing = "snakemake python3-pandas"
+    code, output = project.run(STUB_MISSING=missing, STUB_UID="1000", STUB_NO_SUDO="1")
+    assert code == 1
+    assert f"{APT_LINE}{missing}\n" in output
+    assert "docker build" in output and "docker run" in output
+    assert "apt-get" not in project.stub_log() and "cmake" not in project.stub_log()
+
+
+def test_packages_of_the_tests_are_not_asked_for_by_a_plain_run(project):
+    code, output = project.run("--only", "table1", STUB_MISSING="libgtest-dev", STUB_UID="1000")
+    assert code == 0 and "apt-get" not in project.stub_log()
+    code, output = project.run("test", STUB_MISSING="libgtest-dev", STUB_UID="1000", STUB_NO_SUDO="1")
+    assert code == 1 and f"{APT_LINE}libgtest-dev\n" in output
+
+
+@pytest.mark.parametrize("uid, prefix", [("0", ""), ("1000", "sudo -n env ")])
+def test_missing_packages_are_installed_without_questions(project, uid, prefix):
+    code, output = project.run("--only", "table1", STUB_MISSING="g++ cmake", STUB_UID=uid)
+    assert code == 0
+    assert "installing 2: g++ cmake" in output
+    log = project.stub_log()
+    assert re.search(r"apt-get -y .* update DEBIAN_FRONTEND=noninteractive", log)
+    assert re.search(r"apt-get -y .* install --no-install-recommends g\+\+ cmake DEBIAN_FRONT", log)
+    assert prefix in log and ("sudo" in log) == bool(prefix)
+
+
+def test_a_failing_apt_names_its_log(project):
+    code, output = project.run(STUB_MISSING="g++", STUB_APT_FAILS="1")
+    log = project.results / "logs" / "packages.log"
+    assert code == 1
+    assert f"apt-get update failed; log: {log}" in output
+    assert "E: no network" in log.read_text()
+
+
+def test_a_failing_build_shows_the_error_and_names_its_log(project):
+    (project.root / "fail_build").touch()
+    code, output = project.run("--only", "table1")
+    assert code == 1
+    assert "x.cc:1: error: told to fail" in output
+    assert f"building failed; log: {project.results / 'logs' / 'build.log'}" in output
+
+
+def test_the_test_command_builds_all_and_ends_with_ctests_summary(project):
+    project.data.mkdir()
+    code, output = project.run("test", "--data", "my data", "--jobs", "3")
+    assert code == 2, "a relative folder is the caller's, and the caller is elsewhere"
+    code, output = project.run("test", "--data", str(project.data), "--jobs", "3")
+    assert code == 0
+    log = project.stub_log()
+    assert "cmake --preset release -DSGF_BUILD_TESTS=ON" in log
+    assert "--target" not in log
+    assert f"ctest --preset release --parallel 3 SGF_DATA={project.data}" in log
+    assert output.splitlines()[-1] == "100% tests passed, 0 tests failed out of 3"
+
+
+def test_a_run_builds_only_the_programs_and_keeps_a_developers_tests(project):
+    project.run("--only", "table1")
+    assert "-DSGF_BUILD_TESTS=OFF" in project.stub_log()
+    assert re.search(r"--target sgf_eval sgf_stereo stereo_bench$", project.stub_log(), re.MULTILINE)
+    project.run("test")
+    project.log.unlink()
+    project.run("--only", "table1")
+    assert "-DSGF_BUILD_TESTS=ON" in project.stub_log()
+
+
+def test_clean_keeps_the_reference_and_the_sources(project):
+    reference = project.results / "reference" / "table1.csv"
+    reference.parent.mkdir(parents=True)
+    reference.touch()
+    assert project.run("--only", "table1")[0] == 0
+    assert (project.results / "tables" / "table1.csv").exists()
+    assert project.run("--clean")[0] == 0
+    assert [path.name for path in project.results.iterdir()] == ["reference"]
+    assert reference.exists()
+    assert not project.bin.exists() and not (project.root / "datasets" / "generated").exists()
+    assert (project.root / "datasets" / "debian_pairs.py").exists()

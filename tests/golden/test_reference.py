@@ -1,0 +1,103 @@
+"""Tables of this run against the committed reference run, and the orderings that must hold.
+
+The matchers compute in integers or in doubles of fixed order, so a score repeats to the last digit on
+one compiler. The tolerances leave room for rounding by another compiler, and none for another matcher:
+0.005 px in a mean error, 0.05 percentage points in a share.
+"""
+
+import os
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from sgf_paper import config
+
+REFERENCE = config.PROJECT / "results" / "reference"
+TOLERANCE_PX = 0.005
+TOLERANCE_PCT = 0.05
+SCORES = ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct", "d1_pct", "invalid_pct"]
+OTHERS = ["orig", "sad", "agm", "pm"]
+TABLES = Path(os.environ["SGF_RESULTS"]) / "tables"
+
+
+def tolerance(quantity):
+    return TOLERANCE_PX if quantity.endswith("_px") else TOLERANCE_PCT
+
+
+def read(folder, name):
+    return pd.read_csv(folder / f"{name}.csv", dtype={"scene": str})
+
+
+def require_dataset(frame, dataset):
+    """Skips where a data set cannot be had without a download, but not with SGF_DATA set."""
+    measured = frame[(frame["dataset"] == dataset) & frame["measured"].notna()]
+    if measured.empty and not os.environ.get("SGF_DATA"):
+        pytest.skip(f"data set {dataset} is not at hand: give its folder by SGF_DATA")
+    assert not measured.empty, f"SGF_DATA is set but {dataset} was not measured"
+    return measured
+
+
+def values(frame, region, quantity):
+    """One quantity by cost."""
+    chosen = frame[(frame["region"] == region) & (frame["quantity"] == quantity)]
+    return chosen.set_index("cost")["measured"]
+
+
+@pytest.mark.parametrize("table", ["table1", "table2"])
+@pytest.mark.parametrize("quantity", SCORES)
+def test_scene_scores_equal_the_reference(table, quantity):
+    keys = ["dataset", "scene", "region", "matcher", "cost", "window", "uniqueness"]
+    run, reference = (read(folder, f"{table}_scenes") for folder in (TABLES, REFERENCE))
+    both = run.merge(reference, on=keys, suffixes=("", "_reference"))
+    assert not both.empty
+    difference = (both[quantity] - both[f"{quantity}_reference"]).abs()
+    worst = both.loc[difference.idxmax()]
+    assert difference.max() <= tolerance(quantity), worst.to_dict()
+    assert both[quantity].isna().equals(both[f"{quantity}_reference"].isna())
+
+
+@pytest.mark.parametrize("table", ["table1", "table2"])
+def test_table_equals_the_reference(table):
+    """Means over the same scenes; a data set with other scenes than the reference is left out."""
+    keys = ["dataset", "region", "matcher", "cost", "quantity", "scenes"]
+    run, reference = (read(folder, table) for folder in (TABLES, REFERENCE))
+    both = run[run["measured"].notna()].merge(reference, on=keys, suffixes=("", "_reference"))
+    if os.environ.get("SGF_DATA"):
+        assert not both.empty
+    for row in both.itertuples():
+        assert row.measured == pytest.approx(row.measured_reference, abs=tolerance(row.quantity)), row
+
+
+@pytest.mark.parametrize(
+    "quantity, bound",
+    [("mean_px", 1.41), ("bad1_pct", 11.2), ("bad2_pct", 8.2), ("bad4_pct", 6.2), ("invalid_pct", 33.6)],
+)
+def test_sgf_on_middlebury_is_within_its_bounds(quantity, bound):
+    table = require_dataset(read(TABLES, "table1"), "middlebury2014_q")
+    assert values(table, "all", quantity)["sgf"] <= bound
+
+
+@pytest.mark.parametrize("quantity", ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct"])
+def test_sgf_is_first_on_middlebury(quantity):
+    table = require_dataset(read(TABLES, "table1"), "middlebury2014_q")
+    of_cost = values(table, "all", quantity)
+    assert of_cost["sgf"] < of_cost[OTHERS].min()
+
+
+@pytest.mark.parametrize("quantity", ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct"])
+def test_sgf_is_first_on_middlebury_at_equal_density(quantity):
+    require_dataset(read(TABLES, "table1"), "middlebury2014_q")
+    curves = read(TABLES, "density_equal")
+    curves = curves[(curves["dataset"] == "middlebury2014_q") & (curves["region"] == "all")]
+    wide = curves.pivot(index="kept_pct", columns="cost", values=quantity)
+    compared = wide[["sgf", *OTHERS]].dropna()
+    assert len(compared) >= 3
+    assert (compared["sgf"] < compared[OTHERS].min(axis="columns")).all(), compared
+
+
+@pytest.mark.parametrize("quantity", ["mean_px", "bad2_pct", "bad4_pct", "d1_pct"])
+def test_sgf_is_first_on_kitti(quantity):
+    table = require_dataset(read(TABLES, "table2"), "kitti2015")
+    of_cost = values(table, "noc", quantity)
+    assert of_cost["sgf"] < of_cost[OTHERS].min()

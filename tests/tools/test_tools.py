@@ -1,0 +1,240 @@
+"""sgf_stereo and sgf_eval from the command line, and the installed package."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+HERE = Path(__file__).resolve().parent
+BUILD = Path(os.environ["SGF_BUILD_DIR"])
+SHIFT = 6
+SIZE = (60, 100)  # rows, columns
+
+
+def run(program, *arguments):
+    command = [BUILD / "bin" / program, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+def write_pfm(path, values):
+    rows, columns = values.shape
+    data = np.flipud(values).astype("<f4").tobytes()
+    path.write_bytes(f"Pf\n{columns} {rows}\n-1\n".encode() + data)
+
+
+def read_pfm(path):
+    kind, size, scale, data = path.read_bytes().split(b"\n", 3)
+    assert kind == b"Pf" and float(scale) < 0
+    columns, rows = map(int, size.split())
+    return np.flipud(np.frombuffer(data, "<f4").reshape(rows, columns))
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene of Middlebury's layout at a disparity of SHIFT px, in a dataset of its own."""
+    folder = tmp_path / "dataset" / "Wall"
+    folder.mkdir(parents=True)
+    texture = np.random.default_rng(1).integers(0, 256, (SIZE[0], SIZE[1] + SHIFT), np.uint8)
+    Image.fromarray(texture[:, : SIZE[1]]).save(folder / "im0.png")
+    Image.fromarray(texture[:, SHIFT:]).save(folder / "im1.png")
+    write_pfm(folder / "disp0GT.pfm", np.full(SIZE, SHIFT, np.float32))
+    (folder / "calib.txt").write_text("ndisp=16\n")
+    return folder
+
+
+@pytest.fixture
+def pair(scene):
+    return scene / "im0.png", scene / "im1.png"
+
+
+def fails(result, *parts):
+    """Bad input: exit code 2 and one line on stderr that holds all parts."""
+    assert result.returncode == 2, result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    for part in parts:
+        assert str(part) in result.stderr
+    return True
+
+
+def test_a_pair_gives_disparities_pictures_and_scores(scene, pair, tmp_path):
+    out = tmp_path / "out"
+    result = run("sgf_stereo", *pair, "-o", out, "--gt", scene / "disp0GT.pfm", "--max-disp", 16)
+    assert result.returncode == 0, result.stderr
+    assert sorted(p.name for p in out.iterdir()) == [
+        "colour.png", "disparity.pfm", "disparity.png", "options.yaml", "scores.json"
+    ]
+    disparity = read_pfm(out / "disparity.pfm")
+    matched = np.isfinite(disparity)
+    assert matched[:, SHIFT + 4 :].mean() > 0.99
+    assert np.abs(disparity[matched] - SHIFT).mean() < 0.05
+    png = np.array(Image.open(out / "disparity.png"))
+    # As in KITTI, 0 means none: a disparity of 0 becomes 1.
+    assert np.array_equal(png[matched], np.maximum(1, np.round(256 * disparity[matched])))
+    assert (png[~matched] == 0).all()
+    scores = json.loads((out / "scores.json").read_text())["all"]
+    assert scores["truth_px"] == SIZE[0] * SIZE[1]
+    assert scores["mean_px"] == pytest.approx(np.abs(disparity[matched] - SHIFT).mean(), abs=1e-5)
+    assert Image.open(out / "colour.png").size == SIZE[::-1]
+
+
+def test_a_dataset_folder_gives_a_folder_a_scene(scene, tmp_path):
+    result = run("sgf_stereo", scene.parent, "-o", tmp_path / "out", "--metric", "census")
+    assert result.returncode == 0, result.stderr
+    assert json.loads((tmp_path / "out" / "Wall" / "scores.json").read_text())["all"]["bad1_pct"] < 1
+
+
+@pytest.mark.parametrize("method", ["bm", "opencv_bm"])
+def test_both_methods_print_all_their_options(pair, tmp_path, method):
+    result = run("sgf_stereo", *pair, "-o", tmp_path / "out", "--method", method, "--window", 11)
+    assert result.returncode == 0, result.stderr
+    options = (tmp_path / "out" / "options.yaml").read_text()
+    assert f"method: {method}" in options
+    assert ("window: 11" if method == "bm" else "block_size: 11") in options
+    assert "speckle" in options and "uniqueness" in options
+
+
+def test_instruction_sets_and_threads_give_the_same_file(pair, tmp_path):
+    files = []
+    for name, flags in {"a": [], "b": ["--isa", "scalar"], "c": ["--threads", 1]}.items():
+        assert run("sgf_stereo", *pair, "-o", tmp_path / name, *flags).returncode == 0
+        files.append((tmp_path / name / "disparity.pfm").read_bytes())
+    assert files[0] == files[1] == files[2]
+
+
+def test_flags_come_on_top_of_the_options_file(pair, tmp_path):
+    config = tmp_path / "run.yaml"
+    config.write_text("window: 5\nmetric: pm\n")
+    run("sgf_stereo", *pair, "-o", tmp_path / "out", "--config", config, "--window", 7)
+    options = (tmp_path / "out" / "options.yaml").read_text()
+    assert "window: 7" in options and "metric: pm" in options
+
+
+def test_list_metrics_prints_the_table():
+    result = run("sgf_stereo", "--list-metrics")
+    assert result.returncode == 0
+    names = [line.split()[0] for line in result.stdout.splitlines()[1:]]
+    assert {"photo", "sad", "agm", "pm", "sgf", "sgf2", "sgf3", "ugf", "zncc", "census"} <= set(names)
+
+
+def test_bad_images_are_named(scene, pair, tmp_path):
+    out = tmp_path / "out"
+    missing = tmp_path / "missing.png"
+    assert fails(run("sgf_stereo", missing, pair[1], "-o", out), missing)
+    cut = tmp_path / "cut.png"
+    cut.write_bytes(pair[0].read_bytes()[:-300])
+    assert fails(run("sgf_stereo", cut, pair[1], "-o", out), cut)
+    small = tmp_path / "small.png"
+    Image.fromarray(np.zeros((30, 50), np.uint8)).save(small)
+    assert fails(run("sgf_stereo", pair[0], small, "-o", out), "50x30", "100x60")
+    assert fails(run("sgf_stereo", small, small, "-o", out, "--window", 31), "window", "31", "50x30")
+    assert not out.exists()
+
+
+def test_bad_truth_is_named_and_leaves_nothing_behind(pair, tmp_path):
+    out = tmp_path / "out"
+    other_size = tmp_path / "other.pfm"
+    write_pfm(other_size, np.zeros((5, 5), np.float32))
+    assert fails(run("sgf_stereo", *pair, "-o", out, "--gt", other_size), "5x5", "100x60")
+    cut = tmp_path / "cut.pfm"
+    cut.write_bytes(other_size.read_bytes()[:-7])
+    assert fails(run("sgf_stereo", *pair, "-o", out, "--gt", cut), cut)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "flags, parts",
+    [
+        (["--metric", "sfg"], ["sfg", "sgf3"]),
+        (["--metric", "lssd"], ["lssd"]),
+        (["--max-disp", "0"], ["num_disparities", "0"]),
+        (["--max-disp", "3000"], ["num_disparities", "3000"]),
+        (["--max-disp", "101"], ["num_disparities", "101", "100"]),
+        (["--window", "8"], ["window", "8"]),
+        (["--window", "wide"], ["window", "wide"]),
+        (["--uniqueness", "-1"], ["uniqueness", "-1"]),
+        (["--method", "magic"], ["magic", "opencv_bm"]),
+        (["--isa", "mmx"], ["mmx"]),
+    ],
+)
+def test_bad_options_are_named(pair, tmp_path, flags, parts):
+    assert fails(run("sgf_stereo", *pair, "-o", tmp_path / "out", *flags), *parts)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_unknown_key_is_named_with_file_and_line(pair, tmp_path):
+    config = tmp_path / "run.yaml"
+    config.write_text("window: 5\nwindwo: 7\n")
+    result = run("sgf_stereo", *pair, "-o", tmp_path / "out", "--config", config)
+    assert fails(result, f"{config}:2", "windwo")
+
+
+def test_bad_datasets_are_named(scene, tmp_path):
+    out = tmp_path / "out"
+    missing = tmp_path / "nothing"
+    assert fails(run("sgf_stereo", missing, "-o", out), missing)
+    (scene / "calib.txt").write_text("width=100\n")
+    assert fails(run("sgf_stereo", scene.parent, "-o", out), scene / "calib.txt", "ndisp")
+    assert not out.exists()
+
+
+def test_a_wrong_command_line_ends_with_2(pair):
+    for arguments in ([], [pair[0]], [*pair], [*pair, "--frobnicate"]):
+        assert run("sgf_stereo", *arguments).returncode == 2
+    assert run("sgf_eval").returncode == 2
+    assert run("sgf_stereo", "--help").returncode == 0
+
+
+@pytest.fixture
+def sweep(scene, tmp_path):
+    """Arguments of `sgf_eval stereo` for a sweep over the one scene."""
+    (tmp_path / "catalogue.yaml").write_text(
+        "walls: {title: Walls, layout: middlebury_eval3, folders: [dataset]}\n"
+    )
+    (tmp_path / "sweep.yaml").write_text(
+        "name: test\nmatcher: stereo_bm\ncolumns:\n  sgf: {options: {metric: sgf}}\n"
+        "  orig: {implementation: opencv_bm}\n"
+        "grid: {windows: [5, 9], uniqueness: [0, 15]}\n"
+    )
+    return [
+        "stereo", "--experiment", tmp_path / "sweep.yaml", "--catalogue", tmp_path / "catalogue.yaml",
+        "--data", tmp_path, "--dataset", "walls", "--out", tmp_path / "raw.csv",
+    ]
+
+
+@pytest.mark.parametrize("column", ["sgf", "orig"])
+def test_a_sweep_scores_every_window_and_threshold(sweep, tmp_path, column):
+    result = run("sgf_eval", *sweep, "--column", column, "--options-out", tmp_path / "options.yaml")
+    assert result.returncode == 0, result.stderr
+    header, *lines = (tmp_path / "raw.csv").read_text().splitlines()
+    rows = [dict(zip(header.split(","), line.split(","))) for line in lines]
+    assert [(row["window"], row["uniqueness"]) for row in rows] == [
+        ("5", "0"), ("5", "15"), ("9", "0"), ("9", "15")
+    ]
+    assert all(row["scene"] == "Wall" and row["region"] == "all" for row in rows)
+    assert all(float(row["mean_px"]) < 0.1 for row in rows)
+    assert "options:" in (tmp_path / "options.yaml").read_text()
+
+
+def test_bad_sweeps_are_named(sweep, tmp_path):
+    assert fails(run("sgf_eval", *sweep, "--column", "agm"), "sweep.yaml", "agm")
+    file = tmp_path / "sweep.yaml"
+    file.write_text(file.read_text().replace("metric: sgf", "metrik: sgf"))
+    assert fails(run("sgf_eval", *sweep, "--column", "sgf"), f"{file}:4", "metrik")
+    assert fails(run("sgf_eval", *sweep[:-4], "--dataset", "bridges", "--out", "x", "--column", "sgf"), "bridges")
+    assert not (tmp_path / "raw.csv").exists()
+
+
+def test_another_project_links_the_installed_package(tmp_path):
+    def cmake(*arguments):
+        subprocess.run(["cmake", *map(str, arguments)], check=True, capture_output=True, timeout=300)
+
+    cmake("--install", BUILD, "--prefix", tmp_path / "prefix")
+    cmake("-S", HERE / "consumer", "-B", tmp_path / "build", "-G", "Ninja",
+          f"-DCMAKE_PREFIX_PATH={tmp_path / 'prefix'}")
+    cmake("--build", tmp_path / "build")
+    result = subprocess.run([tmp_path / "build" / "consumer"], capture_output=True, text=True, check=True)
+    assert result.stdout == "disparity 7\n"

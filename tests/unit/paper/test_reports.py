@@ -1,0 +1,181 @@
+"""Density curves, the benchmark's report, figures' inputs and progress lines."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from sgf_paper import bench, config, density, disparity_figure, images, progress, style
+from sgf_paper.config import Density, FigureScene, Parameters
+
+
+@pytest.fixture
+def panels(table, sweep, write_raw, datasets):
+    experiment = Density("density", "density", "Title", ["table9"], ["mean_px"], [65, 75, 95])
+    curves = density.make_curves(experiment, {"table9": table}, sweep, write_raw(), datasets)
+    return experiment, curves
+
+
+def test_curves_use_the_tables_window_for_every_region(panels):
+    _, curves = panels
+    assert [(p.dataset, p.region, p.window, p.scenes) for p in curves] == [
+        ("toys", "all", 9, 3),
+        ("toys", "noc", 9, 3),
+    ]
+    points = curves[next(iter(curves))]["sgf"]
+    assert list(points["kept_pct"]) == [60, 70, 80]
+
+
+def test_equal_shares_are_read_off_the_curves(panels, sweep):
+    experiment, curves = panels
+    equal = density.equal_table(curves, sweep, experiment.kept_pct)
+    sgf = equal[(equal["cost"] == "sgf") & (equal["region"] == "all")].set_index("kept_pct")
+    # at window 9 the mean over scenes is 1 + 1 + 0.5/3 - uniqueness/100; 65 % kept is uniqueness 15
+    assert sgf.loc[65, "mean_px"] == pytest.approx(2 + 0.5 / 3 - 0.15)
+    assert math.isnan(sgf.loc[95, "mean_px"])
+
+
+def test_the_curve_table_has_a_line_per_point(panels, sweep):
+    _, curves = panels
+    table = density.curve_table(curves, sweep)
+    assert len(table) == 2 * 3 * 3
+    assert list(table.columns) == density.CURVE_COLUMNS
+
+
+def test_figures_repeat_to_the_byte(panels, sweep, tmp_path):
+    experiment, curves = panels
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        style.save(density.draw(curves, sweep, experiment), tmp_path / folder, "density")
+    for name in ("density.pdf", "density.png"):
+        first, second = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
+        assert len(first) > 1000 and first == second
+
+
+def run(name, speed, kind="iteration", **more):
+    base = {"name": name, "run_name": name + "/real_time", "run_type": kind}
+    return {**base, "mde_per_s": speed, "peak_mib": 2.0, **more}
+
+
+@pytest.fixture
+def report(tmp_path):
+    def write(runs):
+        path = tmp_path / "bench.json"
+        path.write_text(json.dumps({"context": {}, "benchmarks": runs}))
+        return path
+
+    return write
+
+
+def test_the_benchmark_takes_medians_of_repetitions_and_no_aggregates(report):
+    runs = [run("c/sgf_bm/avx2/1", speed) for speed in (10, 30, 100)]
+    speeds = bench.read_report(report([*runs, run("c/sgf_bm/avx2/1", 9e9, "aggregate")]))
+    assert speeds.to_dict("records") == [
+        {"case": "c", "implementation": "sgf_bm", "isa": "avx2", "threads": 1,
+         "mde_per_s": 30.0, "peak_mib": 2.0}
+    ]  # fmt: skip
+
+
+def test_ratios_stand_against_the_same_instruction_set_or_the_fastest(report):
+    names = {"c/opencv_bm/avx2/1": 100, "c/opencv_bm/sse4/1": 120, "c/opencv_bm/avx2/2": 900,
+             "c/sgf_bm/avx2/1": 200, "c/sgf_bm/avx3/1": 300, "c/sgf_bm/avx3/2": 570}  # fmt: skip
+    speeds = bench.read_report(report([run(name, speed) for name, speed in names.items()]))
+    ratios = bench.ratios_to_opencv(speeds).set_index("isa")["ratio"]
+    assert ratios["avx2"] == pytest.approx(2.0)
+    assert ratios["avx3"] == pytest.approx(300 / 120)
+    scaling = bench.scaling(speeds).set_index("implementation")["ratio"]
+    assert scaling["sgf_bm"] == pytest.approx(1.9)
+    assert scaling["opencv_bm"] == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize(
+    "runs, message",
+    [
+        ([], "no benchmark was run"),
+        ([run("c/sgf_bm/avx2/1", 1, error_occurred=True, error_message="no pair")], "no pair"),
+    ],
+)
+def test_a_failed_benchmark_is_an_error(report, runs, message):
+    with pytest.raises(bench.BenchError, match=message):
+        bench.read_report(report(runs))
+
+
+@pytest.mark.parametrize("order, scale", [("<", b"-0.0039"), (">", b"1")])
+def test_pfm_of_either_byte_order_is_read_top_row_first(tmp_path, order, scale):
+    values = np.array([[1, 2, np.inf], [4, 5, 6]], dtype=f"{order}f4")
+    path = tmp_path / "d.pfm"
+    path.write_bytes(b"Pf\n3 2\n" + scale + b"\n" + values[::-1].tobytes())
+    read = images.read_disparity(path)
+    np.testing.assert_array_equal(read, [[1, 2, np.nan], [4, 5, 6]])
+
+
+def test_kittis_png_is_scaled_and_zero_is_unknown(tmp_path):
+    path = tmp_path / "d.png"
+    Image.fromarray(np.array([[0, 256], [384, 65535]], dtype=np.uint16)).save(path)
+    read = images.read_disparity(path)
+    np.testing.assert_allclose(read, [[np.nan, 1], [1.5, 65535 / 256]])
+
+
+def test_the_matcher_is_called_with_the_columns_options(tmp_path, sweep):
+    (tmp_path / "calib.txt").write_text("width=9\nndisp=73\n")
+    scene = FigureScene("s", "l.png", "r.png", "t.pfm", calibration="calib.txt")
+    at = Parameters(9, 10)
+    command = disparity_figure.matcher_command(tmp_path / "run", tmp_path, scene, sweep, "sgf", at)
+    flags = dict(zip(command[3::2], command[4::2]))
+    assert command[:3] == [str(tmp_path / name) for name in ("run", "l.png", "r.png")]
+    assert flags == {
+        "--gt": str(tmp_path / "t.pfm"), "--method": "bm", "--max-disp": "73", "--window": "9",
+        "--uniqueness": "10", "--left-right-max": "1", "--metric": "sgf",
+    }  # fmt: skip
+    scene = FigureScene("s", "l.png", "r.png", "t.pfm", num_disparities=128)
+    command = disparity_figure.matcher_command(tmp_path / "run", tmp_path, scene, sweep, "orig", at)
+    flags = dict(zip(command[3::2], command[4::2]))
+    assert (flags["--method"], flags["--max-disp"]) == ("opencv_bm", "128")
+    assert "--metric" not in flags
+
+
+def test_every_column_has_its_own_line():
+    sweep = config.load_sweep("stereo_bm")
+    extra = [name for name in sweep.columns if name not in sweep.main_columns]
+    styles = [tuple(sorted(map(str, style.line_style(c, extra).items()))) for c in sweep.columns]
+    assert len(set(styles)) == len(sweep.columns)
+
+
+STATS = """Job stats:
+job       count    min threads    max threads
+------  -------  -------------  -------------
+all           1              1              1
+scores        4              1              1
+table         1              1              1
+total         6              1              1
+"""
+
+
+def test_progress_counts_jobs_and_tells_the_time_left(capsys, monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(progress.time, "time", lambda: now[0])
+    follower = progress.Progress()
+    follower.handle({"level": "run_info", "msg": STATS})
+    follower.handle({"level": "job_info", "jobid": 7, "name": "scores", "msg": "scores one"})
+    now[0] += 10
+    follower.handle({"level": "job_finished", "jobid": 7})
+    line = capsys.readouterr().out
+    # four more jobs, taken to last 10 s each as the finished one did
+    assert line.startswith("  [1/5] scores one") and "elapsed 0:10, about 0:40 left" in line
+
+
+def test_a_failed_job_names_its_log_and_shows_its_end(capsys, tmp_path):
+    log = tmp_path / "x.log"
+    log.write_text("\n".join(f"line {i}" for i in range(30)))
+    follower = progress.Progress()
+    message = {"level": "job_error", "jobid": 1, "name": "scores", "log": [str(log)]}
+    follower.handle({**message, "output": ["raw/x.csv"]})
+    shown = capsys.readouterr().out
+    assert f"FAILED scores: raw/x.csv; log: {log}" in shown
+    assert "| line 29" in shown and "| line 10" not in shown
+
+
+def test_clock():
+    assert [progress.clock(s) for s in (0, 61.4, 3725)] == ["0:00", "1:01", "1:02:05"]
