@@ -152,9 +152,12 @@ class BandMatcher {
 
   // Disparity indices below this, in whole vectors, are candidates of some window that holds column
   // x; the column sums of the others are never looked at and stay zero.
-  int Reach(int x) const {
-    const int needed = std::max(1, x + radius_ - task_.min_disparity + 1);
-    return needed >= stride_ ? stride_ : static_cast<int>(hwy::RoundUpTo(needed, LanesOf<Sum>()));
+  int Reach(int x) const { return WholeVectors(x + radius_ - task_.min_disparity + 1); }
+
+  // A number of disparity indices rounded up to whole vectors: at least one, at most all.
+  int WholeVectors(int count) const {
+    if (count >= stride_) return stride_;
+    return static_cast<int>(hwy::RoundUpTo(std::max(1, count), LanesOf<Sum>()));
   }
 
   template <bool kInside>
@@ -181,6 +184,7 @@ class BandMatcher {
     for (int p = 0; p < kPixels; ++p) {
       std::fill_n(Window(p), task_.num_disparities, SumTraits<Sum>::kOffset);
       std::fill(Window(p) + task_.num_disparities, Window(p) + stride_, kMax);
+      std::fill_n(Window(kPixels + p), stride_, kMax);
     }
     Sum* window = Window(kPixels - 1);
     for (int x = 0; x < radius_; ++x)
@@ -212,18 +216,22 @@ class BandMatcher {
   }
 
   // The sums of `count` pixels from x on over their candidates. All slots are set.
-  HWY_INLINE std::array<const Sum*, kPixels> Candidates(int x, int count) {
+  // @param[out] end all candidates lie below this index, in whole vectors.
+  HWY_INLINE std::array<const Sum*, kPixels> Candidates(int x, int count, int& end) {
     std::array<const Sum*, kPixels> sums;
     for (int p = 0; p < kPixels; ++p) sums[p] = Window(p);
+    end = stride_;
     if (x < task_.num_disparities - 1 + task_.min_disparity ||
-        x + count > task_.width + task_.min_disparity)
-      for (int p = 0; p < count; ++p) sums[p] = MaskedCopy(x + p, p);
+        x + count > task_.width + task_.min_disparity) {
+      end = WholeVectors(x + count - task_.min_disparity);
+      for (int p = 0; p < count; ++p) sums[p] = MaskedCopy(x + p, p, end);
+    }
     return sums;
   }
 
   // The sums of pixel x with those kMax whose disparity leaves the right image, and their least. A
-  // copy, since the window sums themselves slide on.
-  const Sum* MaskedCopy(int x, int p) {
+  // copy up to index `copied`, since the window sums themselves slide on.
+  const Sum* MaskedCopy(int x, int p, int copied) {
     const int first = std::max(0, x - task_.min_disparity - (task_.width - 1));
     const int end = std::min(task_.num_disparities, x - task_.min_disparity + 1);
     const D d;
@@ -232,7 +240,7 @@ class BandMatcher {
     const auto high = hn::Set(d, static_cast<Sum>(std::max(end, 0) - 1));
     Sum* copy = Window(kPixels + p);
     auto least = none;
-    for (int k = 0; k < stride_; k += LanesOf<Sum>()) {
+    for (int k = 0; k < copied; k += LanesOf<Sum>()) {
       const auto index = hn::Load(d, index_.get() + k);
       const auto out = hn::Or(hn::Gt(low, index), hn::Gt(index, high));
       const auto sums = hn::IfThenElse(out, none, hn::Load(d, Window(p) + k));
@@ -244,9 +252,10 @@ class BandMatcher {
   }
 
   void TakeWinners(int x, int y, int count) {
-    const std::array<const Sum*, kPixels> sums = Candidates(x, count);
+    int end;
+    const std::array<const Sum*, kPixels> sums = Candidates(x, count, end);
     Winners<Sum> winners;
-    finder_.Find(sums, count, winners);
+    finder_.Find(sums, count, end, winners);
     int16_t* disparity = (*task_.disparity)[y] + x;
     for (int p = 0; p < count; ++p)
       disparity[p] = winners.accepted[p]

@@ -105,12 +105,12 @@ class WinnerFinder {
   // Where the caller leaves the lane-wise minimum of pixel p's sums.
   Sum* Least(int p) { return lanes_.get() + p * LanesOf<Sum>(); }
 
-  // sums[p] are followed and preceded by three readable values.
+  // sums[p] are followed and preceded by three readable values; those from index `end` on are kMax.
   HWY_INLINE void Find(const std::array<const Sum*, kPixels>& sums, int count,
-                       Winners<Sum>& winners) {
+                       int end, Winners<Sum>& winners) {
     ReduceEach(Least(0), winners.least, [](auto a, auto b) HWY_ATTR { return hn::Min(a, b); });
     SetLimits(winners);
-    for (int p = 0; p < count; ++p) CountBelow(sums[p], winners.limit[p], p);
+    for (int p = 0; p < count; ++p) CountBelow(sums[p], end, winners.limit[p], p);
     ReduceEach(First(0), winners.rank, [](auto a, auto b) HWY_ATTR { return hn::Max(a, b); });
     ReduceEach(Close(0), winners.close, [](auto a, auto b) HWY_ATTR { return hn::Add(a, b); });
     LookAround(sums, winners);
@@ -196,13 +196,13 @@ class WinnerFinder {
 #endif
 
   // Per lane: how many sums lie below the limit, and the highest rank (lowest index) of those.
-  HWY_INLINE void CountBelow(const Sum* sums, Sum limit, int p) {
+  HWY_INLINE void CountBelow(const Sum* sums, int end, Sum limit, int p) {
     const D d;
     const auto bound = hn::Set(d, limit);
     auto first = hn::Zero(d);
     auto close = hn::Zero(d);
 #pragma GCC unroll 4
-    for (int k = 0; k < stride_; k += LanesOf<Sum>()) {
+    for (int k = 0; k < end; k += LanesOf<Sum>()) {
       const auto below = hn::Gt(bound, hn::Load(d, sums + k));
       first = hn::Max(first, hn::IfThenElseZero(below, hn::Load(d, rank_.get() + k)));
       close = hn::Sub(close, hn::VecFromMask(d, below));
