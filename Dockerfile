@@ -26,12 +26,12 @@ USER sgf
 WORKDIR /opt/beyond-photometric
 COPY --chown=sgf:sgf . .
 
-# Any user id may run the image (--user): everything is writable to all, the home is /tmp, and the one file whose
-# mode CMake sets, which only its owner may do, is left for the run to make anew.
+# Any user id may run the image (--user): everything is writable to all, the home is /tmp, and the files whose mode
+# CMake sets, which only their owner may do, are left for the run to make anew.
 ENV HOME=/tmp USER=sgf
 RUN cmake --preset release \
  && cmake --build --preset release \
- && rm build/release/provenance.cc \
+ && rm build/release/provenance.cc build/release/sgf-config*.cmake \
  && mkdir -p results datasets/generated \
  && chmod -R a+rwX .
 

@@ -24,9 +24,10 @@ class BenchError(Exception):
 
 
 def read_report(path: Path) -> pd.DataFrame:
-    """Median over the repetitions of each benchmark, in the report's order."""
+    """Median over the repetitions of each benchmark, in the program's order (runs come shuffled)."""
     rows = []
-    for run in json.loads(path.read_text())["benchmarks"]:
+    runs = json.loads(path.read_text())["benchmarks"]
+    for run in sorted(runs, key=lambda run: run["family_index"]):
         if run.get("run_type") == "aggregate":
             continue
         if run.get("error_occurred"):

@@ -10,6 +10,7 @@ from pathlib import Path
 import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
+import yaml
 
 from sgf_paper import config, images, style
 from sgf_paper.config import DisparityFigure, FigureScene, Parameters, Sweep
@@ -32,7 +33,7 @@ class Scene:
 def matcher_command(
     program: Path, folder: Path, scene: FigureScene, sweep: Sweep, column: str, at: Parameters
 ) -> list[str]:
-    """Call of sgf_stereo (without the output folder) that matches a scene as the sweep's column."""
+    """Call of sgf_stereo that matches a scene as the sweep's column, but for output and options."""
     count = scene.num_disparities or images.read_num_disparities(folder / scene.calibration)
     method = {"block_matcher": "bm", "opencv_bm": "opencv_bm"}[sweep.columns[column].implementation]
     flags = {
@@ -41,7 +42,6 @@ def matcher_command(
         "max-disp": count,
         "window": at.window,
         "uniqueness": at.uniqueness,
-        **{key.replace("_", "-"): value for key, value in sweep.column_options(column).items()},
     }
     command = [str(program), str(folder / scene.left), str(folder / scene.right)]
     for flag, value in flags.items():
@@ -59,9 +59,10 @@ def _match_columns(
     for column in figure.columns:
         out = work / scene.name / column
         out.mkdir(parents=True, exist_ok=True)
-        at = table.parameters(column)
-        command = matcher_command(program, folder, scene, sweep, column, at)
-        subprocess.run([*command, "-o", str(out)], check=True)
+        options = out / "column.yaml"
+        options.write_text(yaml.safe_dump(sweep.column_options(column)))
+        command = matcher_command(program, folder, scene, sweep, column, table.parameters(column))
+        subprocess.run([*command, "--config", str(options), "-o", str(out)], check=True)
         maps.append(images.read_disparity(out / "disparity.pfm"))
     return maps
 

@@ -19,7 +19,7 @@ COLOURS = {
     "sgf": "#D55E00",
 }
 EXTRA_COLOURS = ["#999999", "#CC79A7", "#0072B2", "#B8A000"]
-EXTRA_DASHES = [(0, (4, 2)), (0, (1, 1))]
+EXTRA_DASHES = [(0, (4, 2)), (0, (1, 1)), (0, (6, 1, 1, 1))]
 
 plt.rcParams.update({"font.size": 8, "axes.titlesize": 8, "figure.titlesize": 9, "pdf.fonttype": 42})
 

@@ -153,7 +153,7 @@ class WindowCostRows final : public CostRows {
       AddRow(entered_, [](Sums& column, const Sums& pixel) { column += pixel; });
     if (y - radius_ - 1 >= first_)
       AddRow(y - radius_ - 1, [](Sums& column, const Sums& pixel) { column -= pixel; });
-    for (int d = 0; d < pair_->num_disparities; ++d) SlideAlong(d, stride, costs);
+    SlideAlong(stride, costs);
   }
 
  private:
@@ -178,16 +178,23 @@ class WindowCostRows final : public CostRows {
     return columns_[static_cast<size_t>(x) * pair_->num_disparities + d];
   }
 
-  void SlideAlong(int d, int stride, uint16_t* costs) {
+  // All disparities of a column at a time, in the order they lie in memory.
+  void SlideAlong(int stride, uint16_t* costs) {
     const Metric metric;
-    const int width = pair_->mirror.width;
-    Sums window;
-    for (int x = 0; x < std::min(radius_, width); ++x) window += Column(x, d);
-    for (int x = 0; x < width; ++x) {
-      if (x + radius_ < width) window += Column(x + radius_, d);
-      if (x - radius_ - 1 >= 0) window -= Column(x - radius_ - 1, d);
-      const auto value = static_cast<float>(metric.Value(window));
-      costs[static_cast<size_t>(x) * stride + d] = Quantize(Resolution<Metric>() * value);
+    const int width = pair_->mirror.width, count = pair_->num_disparities;
+    std::vector<Sums> windows(count);
+    const auto slide = [&](int x, auto change) {
+      if (x < 0 || x >= width) return;
+      for (int d = 0; d < count; ++d) change(windows[d], Column(x, d));
+    };
+    const auto enter = [](Sums& window, const Sums& column) { window += column; };
+    const auto leave = [](Sums& window, const Sums& column) { window -= column; };
+    for (int x = 0; x < radius_; ++x) slide(x, enter);
+    for (int x = 0; x < width; ++x, costs += stride) {
+      slide(x + radius_, enter);
+      slide(x - radius_ - 1, leave);
+      for (int d = 0; d < count; ++d)
+        costs[d] = Quantize(Resolution<Metric>() * static_cast<float>(metric.Value(windows[d])));
     }
   }
 

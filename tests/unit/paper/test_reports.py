@@ -55,7 +55,7 @@ def test_figures_repeat_to_the_byte(panels, sweep, tmp_path):
 
 
 def run(name, speed, kind="iteration", **more):
-    base = {"name": name, "run_name": name + "/real_time", "run_type": kind}
+    base = {"name": name, "run_name": name + "/real_time", "run_type": kind, "family_index": 0}
     return {**base, "mde_per_s": speed, "peak_mib": 2.0, **more}
 
 
@@ -76,6 +76,11 @@ def test_the_benchmark_takes_medians_of_repetitions_and_no_aggregates(report):
         {"case": "c", "implementation": "sgf_bm", "isa": "avx2", "threads": 1,
          "mde_per_s": 30.0, "peak_mib": 2.0}
     ]  # fmt: skip
+
+
+def test_shuffled_runs_are_listed_in_the_programs_order(report):
+    runs = [run(f"c/sgf_bm/isa{i}/1", 1, family_index=i) for i in (2, 0, 1, 2)]
+    assert list(bench.read_report(report(runs))["isa"]) == ["isa0", "isa1", "isa2"]
 
 
 def test_ratios_stand_against_the_same_instruction_set_or_the_fastest(report):
@@ -118,22 +123,39 @@ def test_kittis_png_is_scaled_and_zero_is_unknown(tmp_path):
     np.testing.assert_allclose(read, [[np.nan, 1], [1.5, 65535 / 256]])
 
 
-def test_the_matcher_is_called_with_the_columns_options(tmp_path, sweep):
+def flags_of(command):
+    return dict(zip(command[3::2], command[4::2]))
+
+
+def test_the_matcher_is_called_as_the_sweep_would(tmp_path, sweep):
     (tmp_path / "calib.txt").write_text("width=9\nndisp=73\n")
     scene = FigureScene("s", "l.png", "r.png", "t.pfm", calibration="calib.txt")
     at = Parameters(9, 10)
     command = disparity_figure.matcher_command(tmp_path / "run", tmp_path, scene, sweep, "sgf", at)
-    flags = dict(zip(command[3::2], command[4::2]))
     assert command[:3] == [str(tmp_path / name) for name in ("run", "l.png", "r.png")]
-    assert flags == {
+    assert flags_of(command) == {
         "--gt": str(tmp_path / "t.pfm"), "--method": "bm", "--max-disp": "73", "--window": "9",
-        "--uniqueness": "10", "--left-right-max": "1", "--metric": "sgf",
+        "--uniqueness": "10",
     }  # fmt: skip
     scene = FigureScene("s", "l.png", "r.png", "t.pfm", num_disparities=128)
     command = disparity_figure.matcher_command(tmp_path / "run", tmp_path, scene, sweep, "orig", at)
-    flags = dict(zip(command[3::2], command[4::2]))
+    flags = flags_of(command)
     assert (flags["--method"], flags["--max-disp"]) == ("opencv_bm", "128")
-    assert "--metric" not in flags
+
+
+@pytest.mark.parametrize("width, rows", [(30, 1), (90, 3)])
+def test_wide_images_stand_two_abreast_on_one_colour_scale(width, rows):
+    truth = np.linspace(1, 40, 30 * width).reshape(30, width)
+    truth[0, 0] = np.nan
+    image = np.zeros((30, width), dtype=np.uint8)
+    half = np.where(np.arange(width) % 2, truth, np.nan)
+    scene = disparity_figure.Scene("s", image, truth, [half, truth + 100, truth])
+    drawing = disparity_figure.draw([scene], ["one", "two", "three"])
+    panels = [axis for axis in drawing.axes if axis.get_title()]
+    kept = ["one (50 % kept)", "two (100 % kept)", "three (100 % kept)"]
+    assert [axis.get_title() for axis in panels] == ["s, image", "ground truth", *kept]
+    assert {axis.get_gridspec().nrows for axis in panels} == {rows}
+    assert {axis.get_images()[0].get_clim() for axis in panels[1:]} == {(0.0, 40.0)}
 
 
 def test_every_column_has_its_own_line():
