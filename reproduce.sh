@@ -93,9 +93,9 @@ These packages are missing, and installing needs root or sudo without a password
 
 Or run everything in a container:
 
-  docker build -t beyond-photometric .
+  docker build -t sgf .
   docker run --rm --user "\$(id -u):\$(id -g)" \\
-    -v "\$PWD/results:/opt/beyond-photometric/results" beyond-photometric
+    -v "\$PWD/results:/opt/beyond-photometric/results" sgf
 END
 }
 

@@ -175,6 +175,7 @@ class Benchmark:
     dataset: str
     scene: str
     repetitions: int
+    min_time_s: float  # of one repetition
 
     def pair(self, datasets: dict[str, Dataset]) -> Path | None:
         """Folder of the pair that is matched, None if it is not at hand."""

@@ -101,8 +101,15 @@ def draw(panels: dict[Panel, Curves], sweep: Sweep, density: Density) -> plt.Fig
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="lower center", ncol=6, frameon=False)
     figure.suptitle(density.title)
-    figure.tight_layout(rect=(0, 0.6 / size[1], 1, 1))
+    figure.tight_layout(rect=(0, 0.6 / size[1], 1, 1 - 0.15 / size[1]))
     return figure
+
+
+def _top(curves: Curves, sweep: Sweep, quantity: str) -> float:
+    """Upper end of the axis: what the paper's columns reach. Extra columns may leave the plot, and
+    so may shares so small that a few pixels decide."""
+    paper = [points for name, points in curves.items() if not sweep.columns[name].extra]
+    return 1.1 * max(points.loc[points["kept_pct"] >= 10, quantity].max() for points in paper)
 
 
 def _draw_plot(axis: plt.Axes, curves: Curves, sweep: Sweep, quantity: str) -> None:
@@ -112,7 +119,7 @@ def _draw_plot(axis: plt.Axes, curves: Curves, sweep: Sweep, quantity: str) -> N
         axis.plot(points["kept_pct"], points[quantity], label=column, **style_of)
     axis.set_xlabel("pixels kept, % of those with ground truth")
     axis.set_ylabel(text.LABELS[quantity])
-    axis.set_ylim(bottom=0)
+    axis.set_ylim(0, _top(curves, sweep, quantity))
     axis.grid(alpha=0.3, linewidth=0.5)
 
 

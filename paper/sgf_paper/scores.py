@@ -16,7 +16,7 @@ from sgf_paper.config import Parameters, Sweep, Table
 ERRORS = ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct", "d1_pct"]
 RAW_COLUMNS = [
     "dataset", "scene", "region", "matcher", "column", "window", "uniqueness",
-    "truth_px", "matched_px", *ERRORS, "invalid_pct", "seconds",
+    "truth_px", "matched_px", *ERRORS, "invalid_pct",
 ]  # fmt: skip
 
 

@@ -57,6 +57,15 @@ void OptionFlags::Add(CLI::App& app, const OptionDoc& doc,
       text);
 }
 
+std::set<std::string> OptionFlags::Given() const {
+  std::set<std::string> names;
+  const YAML::Node config = config_.empty() ? YAML::Node() : LoadConfig();
+  for (const YAML::Node& map : {config, flags_})
+    if (map.IsMap())
+      for (const auto& entry : map) names.insert(entry.first.Scalar());
+  return names;
+}
+
 YAML::Node OptionFlags::LoadConfig() const { return LoadYamlFile(config_); }
 
 }  // namespace sgf::apps

@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -24,6 +25,9 @@ class OptionFlags {
     app.add_option("--config", config_, "YAML file with options; flags come on top");
     for (const OptionDoc& doc : DescribeOptions(defaults)) Add(app, doc, renamed);
   }
+
+  /// Names of the options that file and flags set, the outer ones of nested options.
+  std::set<std::string> Given() const;
 
   /// Sets what file and flags say. @throws Error for what they say wrongly.
   template <OptionsStruct O>

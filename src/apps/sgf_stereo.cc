@@ -1,6 +1,8 @@
 // Stereo matching of one rectified pair, or of all pairs of a dataset folder.
 
 #include <filesystem>
+#include <optional>
+#include <set>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
@@ -28,8 +30,8 @@ struct Arguments {
   std::string output;
   std::string method = "bm";
   std::string truth;
-  double truth_scale = 1;
-  std::string layout = "middlebury_eval3";
+  std::optional<double> truth_scale;
+  std::string layout;
   std::string isa;
   bool list_metrics = false;
 };
@@ -102,7 +104,9 @@ void MatchPair(const Arguments& arguments, const stereo::BlockMatcherOptions& op
   nlohmann::json scores;
   for (const auto& [region, truth] : truths)
     if (!truth.empty()) scores[region] = ToJson(ScoreDisparity(disparity, truth));
-  fs::create_directories(folder);
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
   WriteDisparity(folder, disparity, options);
   WriteRunOptions(folder, arguments.method, method->Options());
   if (scores.empty()) return;
@@ -117,30 +121,57 @@ void MatchPair(const Arguments& arguments, const stereo::BlockMatcherOptions& op
 void MatchFiles(const Arguments& arguments, const stereo::BlockMatcherOptions& options) {
   std::map<std::string, cv::Mat1f> truths;
   if (!arguments.truth.empty())
-    truths["all"] = ReadDisparity(arguments.truth, arguments.truth_scale);
+    truths["all"] = ReadDisparity(arguments.truth, arguments.truth_scale.value_or(1));
   MatchPair(arguments, options, ReadGrey(arguments.inputs[0]), ReadGrey(arguments.inputs[1]),
             truths, arguments.output);
 }
 
-void MatchFolder(const Arguments& arguments, stereo::BlockMatcherOptions options) {
+// @param own_disparities the command line's number of disparities goes before the scenes' own.
+void MatchFolder(const Arguments& arguments, stereo::BlockMatcherOptions options,
+                 bool own_disparities) {
   StereoLayout layout{};
-  options_internal::ParseValue(YAML::Node(arguments.layout), "layout", "command line", layout);
+  if (!arguments.layout.empty())
+    options_internal::ParseValue(YAML::Node(arguments.layout), "layout", "command line", layout);
   const int default_disparities = options.num_disparities;
   for (const StereoScene& scene : ListStereoScenes(arguments.inputs[0], layout)) {
     const StereoPair pair = LoadStereoScene(scene);
-    options.num_disparities = pair.num_disparities > 0 ? pair.num_disparities : default_disparities;
+    const bool use_scene = pair.num_disparities > 0 && !own_disparities;
+    options.num_disparities = use_scene ? pair.num_disparities : default_disparities;
     MatchPair(arguments, options, ToGrey(pair.left), ToGrey(pair.right),
               {{"all", pair.truth_all}, {"noc", pair.truth_noc}},
               fs::path(arguments.output) / pair.name);
   }
 }
 
+// What is given must have an effect.
+void RequireEffect(const Arguments& arguments, const std::set<std::string>& given) {
+  const bool folder = arguments.inputs.size() == 1;
+  if (folder && !arguments.truth.empty())
+    throw Error("--gt", "goes with a pair of images; a dataset folder brings its own");
+  if (!folder && !arguments.layout.empty()) throw Error("--layout", "goes with a dataset folder");
+  if (arguments.truth_scale && arguments.truth.empty()) throw Error("--gt-scale", "goes with --gt");
+  if (arguments.method != "opencv_bm") return;
+  static const std::set<std::string> kOfOpenCv{"min_disparity", "num_disparities", "window",
+                                               "uniqueness_pct", "threads"};
+  for (const std::string& name : given)
+    if (!kOfOpenCv.contains(name))
+      throw Error(name, "is not an option of opencv_bm, which keeps OpenCV's defaults");
+}
+
+void RequireOutput(const fs::path& folder) {
+  if (folder.empty()) throw Error("--output", "is missing: name a folder for the results");
+  std::error_code ignored;
+  if (fs::exists(folder, ignored) && !fs::is_directory(folder, ignored))
+    throw Error(folder.string(), "is not a folder");
+}
+
 void Run(const Arguments& arguments, const OptionFlags& flags) {
   if (arguments.list_metrics) return ListMetrics();
   if (arguments.inputs.empty() || arguments.inputs.size() > 2)
     throw Error("", "expected a left and a right image, or one dataset folder; see --help");
-  if (arguments.output.empty())
-    throw Error("--output", "is missing: name a folder for the results");
+  RequireOutput(arguments.output);
+  const std::set<std::string> given = flags.Given();
+  RequireEffect(arguments, given);
   stereo::BlockMatcherOptions options;
   options.threads = 0;
   flags.Apply(options);
@@ -148,7 +179,7 @@ void Run(const Arguments& arguments, const OptionFlags& flags) {
   if (arguments.inputs.size() == 2)
     MatchFiles(arguments, options);
   else
-    MatchFolder(arguments, options);
+    MatchFolder(arguments, options, given.contains("num_disparities"));
 }
 
 }  // namespace
@@ -167,11 +198,11 @@ int main(int argc, char** argv) {
   app.add_option("--method", arguments.method, "bm (ours) or opencv_bm (cv::StereoBM)")
       ->capture_default_str();
   app.add_option("--gt", arguments.truth, "true disparities of the left image (PFM, PNG, PGM)");
-  app.add_option("--gt-scale", arguments.truth_scale, "grey levels per px of an 8-bit --gt")
-      ->capture_default_str();
+  app.add_option("--gt-scale", arguments.truth_scale,
+                 "grey levels per px of an 8-bit --gt (default 1)");
   app.add_option("--layout", arguments.layout,
-                 "layout of a dataset FOLDER: " + options_internal::KnownNames(StereoLayout{}))
-      ->capture_default_str();
+                 "layout of a dataset FOLDER: " + options_internal::KnownNames(StereoLayout{}) +
+                     " (default the first)");
   app.add_option("--isa", arguments.isa,
                  "use only this SIMD instruction set (results are the same)");
   app.add_flag("--list-metrics", arguments.list_metrics, "print the table of dissimilarities");

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <limits>
 
 #include <fmt/core.h>
@@ -33,7 +34,8 @@ class BlockMatching final : public StereoMethod {
 
 class OpenCvBlockMatching final : public StereoMethod {
  public:
-  explicit OpenCvBlockMatching(const stereo::BlockMatcherOptions& o) {
+  explicit OpenCvBlockMatching(const stereo::BlockMatcherOptions& o) : options_(o) {
+    stereo::CheckOptions(o);
     constexpr int kMultiple = 16, kSmallestBlock = 5;
     if (o.window % 2 == 0 || o.window < kSmallestBlock)
       throw Error("window", fmt::format("cv::StereoBM takes odd ones from {}, got {}",
@@ -44,15 +46,16 @@ class OpenCvBlockMatching final : public StereoMethod {
   }
 
   void SetPair(const cv::Mat1b& left, const cv::Mat1b& right) override {
-    if (matcher_->getBlockSize() > std::min(left.cols, left.rows))
-      throw Error("window", fmt::format("{} exceeds the image of {}x{}", matcher_->getBlockSize(),
-                                        left.cols, left.rows));
+    stereo::CheckPair(left, right, options_);
     left_ = left;
     right_ = right;
   }
 
   cv::Mat1f Disparity(double uniqueness_pct) override {
     constexpr int kScale = cv::StereoMatcher::DISP_SCALE;
+    if (uniqueness_pct != std::floor(uniqueness_pct))
+      throw Error("uniqueness_pct",
+                  fmt::format("cv::StereoBM takes whole percents, got {}", uniqueness_pct));
     matcher_->setUniquenessRatio(static_cast<int>(uniqueness_pct));
     cv::Mat1s disparity;
     matcher_->compute(left_, right_, disparity);
@@ -82,6 +85,7 @@ class OpenCvBlockMatching final : public StereoMethod {
   }
 
  private:
+  stereo::BlockMatcherOptions options_;
   cv::Ptr<cv::StereoBM> matcher_;
   cv::Mat1b left_, right_;
 };

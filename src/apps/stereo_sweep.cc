@@ -1,4 +1,3 @@
-#include <chrono>
 
 #include <fmt/core.h>
 
@@ -25,7 +24,7 @@ struct Grid {
 };
 
 struct Sweep {
-  std::string name, matcher;
+  std::string matcher;
   YAML::Node columns, num_disparities, options;
   Grid grid;
 };
@@ -40,8 +39,7 @@ Sweep ReadSweep(const std::string& file) {
   for (const auto& entry : root)
     if (const auto key = entry.first.as<std::string>(); !kKnown.contains(key))
       throw Error(options_internal::At(file, entry.first), fmt::format("unknown key '{}'", key));
-  Sweep sweep{root["name"].as<std::string>(),
-              root["matcher"].as<std::string>(),
+  Sweep sweep{root["matcher"].as<std::string>(),
               root["columns"],
               root["num_disparities"],
               root["options"],
@@ -86,53 +84,47 @@ int NumDisparities(const Sweep& sweep, const StereoSweepRequest& request, const 
   return node.as<int>();
 }
 
-double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 // The CSV lines of one scene and window.
 std::string ScoreWindow(const Sweep& sweep, const StereoSweepRequest& request,
                         const StereoPair& pair, StereoMethod& method, int window) {
   std::string lines;
-  const auto start = std::chrono::steady_clock::now();
   method.SetPair(ToGrey(pair.left), ToGrey(pair.right));
   for (const double uniqueness : sweep.grid.uniqueness) {
     const cv::Mat1f disparity = method.Disparity(uniqueness);
-    const double seconds = SecondsSince(start);
     for (const auto& [region, truth] :
          {std::pair{"all", pair.truth_all}, std::pair{"noc", pair.truth_noc}}) {
       if (truth.empty()) continue;
       const DisparityScores s = ScoreDisparity(disparity, truth);
-      lines += fmt::format(
-          "{},{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.3f}\n",
-          request.dataset, pair.name, region, sweep.matcher, request.column, window, uniqueness,
-          s.truth_px, s.matched_px, s.mean_px, s.bad1_pct, s.bad2_pct, s.bad4_pct, s.d1_pct,
-          s.invalid_pct, seconds);
+      lines += fmt::format("{},{},{},{},{},{},{},{},{},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f}\n",
+                           request.dataset, pair.name, region, sweep.matcher, request.column,
+                           window, uniqueness, s.truth_px, s.matched_px, s.mean_px, s.bad1_pct,
+                           s.bad2_pct, s.bad4_pct, s.d1_pct, s.invalid_pct);
     }
   }
   return lines;
 }
 
-}  // namespace
-
-void RunStereoSweep(const StereoSweepRequest& request, const CatalogueEntry& entry,
-                    const std::filesystem::path& folder) {
+void RunSweep(const StereoSweepRequest& request, const CatalogueEntry& entry,
+              const std::filesystem::path& folder) {
   const Sweep sweep = ReadSweep(request.experiment);
   Column column = ReadColumn(sweep, request);
   std::string table =
       "dataset,scene,region,matcher,column,window,uniqueness,truth_px,matched_px,mean_px,"
-      "bad1_pct,bad2_pct,bad4_pct,d1_pct,invalid_pct,seconds\n";
-  YAML::Node resolved;
+      "bad1_pct,bad2_pct,bad4_pct,d1_pct,invalid_pct\n";
+  YAML::Node resolved;  // "options" are those of the first scene and window
   resolved["implementation"] = column.implementation;
+  resolved["windows"] = sweep.grid.windows;
+  resolved["uniqueness"] = sweep.grid.uniqueness;
   for (const StereoScene& scene : ListStereoScenes(folder, entry.layout)) {
     const StereoPair pair = LoadStereoScene(scene);
     column.options.num_disparities = NumDisparities(sweep, request, pair);
     for (const int window : sweep.grid.windows) {
       column.options.window = window;
       const auto method = MakeStereoMethod(column.implementation, column.options);
+      if (!resolved["options"]) resolved["options"] = method->Options();
       table += ScoreWindow(sweep, request, pair, *method, window);
-      resolved["options"] = method->Options();
     }
+    resolved["num_disparities"][pair.name] = column.options.num_disparities;
   }
   AtomicFile file(request.output);
   file.Write(table);
@@ -141,6 +133,17 @@ void RunStereoSweep(const StereoSweepRequest& request, const CatalogueEntry& ent
   AtomicFile options(request.options_output);
   options.Write(YAML::Dump(resolved) + "\n");
   options.Commit();
+}
+
+}  // namespace
+
+void RunStereoSweep(const StereoSweepRequest& request, const CatalogueEntry& entry,
+                    const std::filesystem::path& folder) {
+  try {
+    RunSweep(request, entry, folder);
+  } catch (const YAML::Exception& error) {  // a value of the wrong kind
+    throw Error(fmt::format("{}:{}", request.experiment, error.mark.line + 1), error.msg);
+  }
 }
 
 }  // namespace sgf::apps

@@ -18,8 +18,12 @@ void ParallelFor(int count, int threads, const std::function<void(int)>& body) {
     for (int i = 0; i < count; ++i) body(i);
     return;
   }
-  tbb::task_arena arena(n);
-  arena.execute([&] { tbb::parallel_for(0, count, body, tbb::simple_partitioner()); });
+  const auto run = [&] { tbb::parallel_for(0, count, body, tbb::simple_partitioner()); };
+  // The caller's arena has its workers awake; another one is for fewer threads only.
+  if (n >= tbb::this_task_arena::max_concurrency())
+    run();
+  else
+    tbb::task_arena(n).execute(run);
 }
 
 }  // namespace sgf

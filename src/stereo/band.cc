@@ -29,7 +29,7 @@ class RowSource {
  public:
   using Sum = int32_t;
   using Cost = uint16_t;
-  using D = hn::ScalableTag<Sum>;
+  using D = VectorTag<Sum>;
 
   RowSource(const BandTask& task, CostRows& rows, int stride)
       : rows_(rows),
@@ -96,7 +96,7 @@ class BandMatcher {
  private:
   using Sum = typename Source::Sum;
   using Cost = typename Source::Cost;
-  using D = hn::ScalableTag<Sum>;
+  using D = VectorTag<Sum>;
   using V = hn::Vec<D>;
   static constexpr Sum kMax = SumTraits<Sum>::kMax;
   // kMax around every row of window sums: enough for a vector and the pixels of a block, and a

@@ -50,8 +50,8 @@ struct SgfImage {
   float tau;
 };
 
-/// Largest cost scale s for which a window's sum of costs, each at most 2 s, fits 16 bits and a
-/// cost fits 8; a dissimilarity of 1 becomes the cost s.
+/// Cost of a dissimilarity of 1: at most 63, and as large as lets a window's sum of costs fit 16
+/// bits (63 up to 21 px, 11 at 51 px). tau is effectively at least this over 32767.
 int SgfCostScale(int window);
 
 /// Sum over rows [begin, end) of squared gradient magnitudes of an 8-bit image, exact in units of

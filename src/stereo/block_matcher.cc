@@ -22,8 +22,9 @@ namespace {
 using internal::BandTask;
 using internal::SgfImage;
 
+constexpr int kLargestUniqueness = 99;   // percent; less than the winner itself
 constexpr int kLargestDisparity = 2047;  // 16 times it fits 16 bits
-constexpr int kLargestWindow = 101;      // at which a 16-bit sum still holds costs of some levels
+constexpr int kLargestWindow = 51;       // at which 16 bits still hold sums of costs of 20 levels
 
 void RequireRange(const char* option, double value, double low, double high) {
   if (!(value >= low && value <= high))
@@ -34,8 +35,12 @@ void RequireOdd(const char* option, int value) {
   if (value % 2 == 0) throw Error(option, fmt::format("must be odd, got {}", value));
 }
 
-void Validate(const BlockMatcherOptions& o) {
-  metrics::FindMetric(o.metric);
+}  // namespace
+
+void CheckOptions(const BlockMatcherOptions& o) {
+  if (metrics::FindMetric(o.metric).traits.kind == metrics::MetricKind::kPatch)
+    throw Error("metric",
+                fmt::format("'{}' compares patches and cannot be a stereo cost", o.metric));
   RequireRange("min_disparity", o.min_disparity, -kLargestDisparity, kLargestDisparity);
   RequireRange("num_disparities", o.num_disparities, 1, kLargestDisparity - o.min_disparity + 1);
   RequireRange("window", o.window, 1, kLargestWindow);
@@ -51,7 +56,7 @@ void Validate(const BlockMatcherOptions& o) {
   RequireRange("pm.tau_c", o.pm.tau_c, 0, std::numeric_limits<double>::infinity());
   RequireRange("pm.tau_g", o.pm.tau_g, 0, std::numeric_limits<double>::infinity());
   RequireRange("tau", o.tau, 1e-30, 1);
-  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, 99);
+  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, kLargestUniqueness);
   RequireRange("texture_threshold", o.texture_threshold, 0, 1e6);
   RequireRange("left_right_max", o.left_right_max, -1, kLargestDisparity);
   RequireRange("speckle_window", o.speckle_window, 0, 1e9);
@@ -59,7 +64,7 @@ void Validate(const BlockMatcherOptions& o) {
   RequireRange("threads", o.threads, 0, 4096);
 }
 
-void RequirePair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {
+void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {
   RequireGreyImage(left, "left image");
   RequireGreyImage(right, "right image");
   if (left.size() != right.size() || left.type() != right.type())
@@ -73,6 +78,8 @@ void RequirePair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOp
     throw Error("num_disparities", fmt::format("{} exceeds the image's width of {}",
                                                options.num_disparities, left.cols));
 }
+
+namespace {
 
 int UniquenessQ16(double percent) { return static_cast<int>(std::lround(percent / 100 * 65536)); }
 
@@ -121,8 +128,7 @@ SgfImage PrepareSgf(const cv::Mat& image, const BlockMatcherOptions& options) {
 template <class MatchBand>
 void ForEachBand(const BandTask& whole, int threads, const MatchBand& match_band) {
   const int count = ResolveThreads(threads);
-  const int bands =
-      std::min(count == 1 ? 1 : 2 * count, std::max(1, whole.height / (2 * whole.window)));
+  const int bands = std::min(count, std::max(1, whole.height / (2 * whole.window)));
   ParallelFor(bands, count, [&](int i) {
     BandTask band = whole;
     band.y_begin = static_cast<int>(int64_t{whole.height} * i / bands);
@@ -177,7 +183,7 @@ std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel) {
 }
 
 BlockMatcher::BlockMatcher(BlockMatcherOptions options) : options_(std::move(options)) {
-  Validate(options_);
+  CheckOptions(options_);
 }
 
 namespace {
@@ -191,7 +197,7 @@ BandTask MakeTask(const BlockMatcherOptions& o, cv::Mat1s& out) {
 }  // namespace
 
 void BlockMatcher::Compute(const cv::Mat& left, const cv::Mat& right, cv::Mat1s& disparity) const {
-  RequirePair(left, right, options_);
+  CheckPair(left, right, options_);
   disparity.create(left.size());
   BandTask task = MakeTask(options_, disparity);
   task.uniqueness_q16 = UniquenessQ16(options_.uniqueness_pct);
@@ -200,7 +206,7 @@ void BlockMatcher::Compute(const cv::Mat& left, const cv::Mat& right, cv::Mat1s&
 }
 
 Matches BlockMatcher::Match(const cv::Mat& left, const cv::Mat& right) const {
-  RequirePair(left, right, options_);
+  CheckPair(left, right, options_);
   Matches matches;
   matches.disparity.create(left.size());
   BandTask task = MakeTask(options_, matches.disparity);
@@ -214,6 +220,7 @@ Matches BlockMatcher::Match(const cv::Mat& left, const cv::Mat& right) const {
 
 cv::Mat1s BlockMatcher::Filter(const Matches& matches, const cv::Mat& left,
                                double uniqueness_pct) const {
+  RequireRange("uniqueness_pct", uniqueness_pct, 0, kLargestUniqueness);
   cv::Mat1s disparity = matches.disparity.clone();
   const int64_t q16 = UniquenessQ16(uniqueness_pct);
   const auto close = [q16](int best, int second) { return second <= best + ((best * q16) >> 16); };

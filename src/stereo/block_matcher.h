@@ -75,7 +75,8 @@ struct BlockMatcherOptions {
     visit("prefilter_cap", prefilter_cap, "grey levels", "prefilter response is clipped to +-cap");
     visit("gradient", gradient, "", "derivative operator");
     visit("epsilon", epsilon, "", "normalisation of gradients, eq. 6");
-    visit("tau", tau, "", "lower bound of the denominator of sgf, eq. 10");
+    visit("tau", tau, "",
+          "lower bound of the denominator of sgf, eq. 10 (metric sgf: at least 0.002)");
     visit("pm", pm, "", "parameters of pm, eq. 4");
     visit("subpixel", subpixel, "", "interpolation of the winner's cost");
     visit(
@@ -93,6 +94,12 @@ struct BlockMatcherOptions {
     visit("threads", threads, "", "threads over bands of rows; 0 for all cores");
   }
 };
+
+/// @throws Error for an option out of range, with its name and value.
+void CheckOptions(const BlockMatcherOptions& options);
+
+/// @throws Error for two images that do not fit each other or the options.
+void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options);
 
 /// Disparities of the left image in 1/16 px, as cv::StereoBM gives them, with what the filters that
 /// drop matches need.
@@ -133,6 +140,7 @@ class BlockMatcher {
 
   /// Applies uniqueness, texture and speckle filters: Compute() is Filter(Match(...)).
   /// @param uniqueness_pct stands in for the option of that name.
+  /// @throws Error when it is out of range.
   cv::Mat1s Filter(const Matches& matches, const cv::Mat& left, double uniqueness_pct) const;
 
   /// CV_16S disparities in 1/16 px as float in px, NaN where there is no match.

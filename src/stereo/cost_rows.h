@@ -18,9 +18,9 @@ struct CostRowsFactory {
   int window;  ///< over which costs are summed: 1 where the dissimilarity has a window of its own
 };
 
-/// Prepares both images for `options.metric` (a name of the table with a single number per pixel
-/// pair or window) and returns the maker of its cost rows. Costs are |e| in units of 1/resolution,
-/// at most 65535: 1/256 grey level or 1/16384 for dissimilarities bounded by 2.
+/// Prepares both images for `options.metric` and returns the maker of its cost rows. Costs are |e|
+/// as integers of at most 65535, in units that suit the range of the dissimilarity: 1/16383 for
+/// gain-invariant ones, 1/256 grey level for differences, 1 for products of gradients and bits.
 CostRowsFactory PrepareCostRows(const cv::Mat& left, const cv::Mat& right,
                                 const BlockMatcherOptions& options);
 

@@ -15,13 +15,14 @@
 #include <hwy/highway.h>
 
 #include <sgf/stereo/band.h>
+#include <sgf/stereo/vector_tag-inl.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace sgf::stereo::internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using D16 = hn::ScalableTag<int16_t>;
+using D16 = VectorTag<int16_t>;
 using V16 = hn::Vec<D16>;
 
 // A vector of Q15 numbers under the operations that sgf.inc asks for; metrics::Q15 is its scalar.
@@ -118,7 +119,7 @@ constexpr float kIntegerGradientUnit = 1.F / 32;  // grey levels per pixel
 // Gradient of row y, grey levels per pixel. Whole vectors are written.
 HWY_INLINE void GradientRow(IntegerGradient& gradient, const cv::Mat1b& image, int y, float* gx,
                             float* gy) {
-  const hn::ScalableTag<float> df;
+  const VectorTag<float> df;
   const hn::Rebind<int32_t, decltype(df)> di;
   const hn::Rebind<int16_t, decltype(df)> d_half;
   const D16 d;
@@ -142,7 +143,7 @@ HWY_INLINE void GradientRow(IntegerGradient& gradient, const cv::Mat1b& image, i
 // Sum of squared gradient magnitudes over rows [begin, end), exact, in units of
 // kIntegerGradientUnit squared.
 int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begin, int end) {
-  const hn::ScalableTag<int32_t> di;
+  const VectorTag<int32_t> di;
   const hn::Rebind<int16_t, decltype(di)> d_half;
   const D16 d;
   const int lanes = static_cast<int>(hn::Lanes(d)), half = static_cast<int>(hn::Lanes(di));
@@ -180,7 +181,7 @@ int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begi
 // @param epsilon one value, or with `epsilon_map` one a column.
 HWY_INLINE void QuantizeRow(const float* gx, const float* gy, const float* epsilon,
                             bool epsilon_map, float tau, int scale, int width, SgfRow& out) {
-  const hn::ScalableTag<float> df;
+  const VectorTag<float> df;
   const hn::Rebind<int16_t, decltype(df)> d16;
   const int lanes = static_cast<int>(hn::Lanes(df));
   const auto one = hn::Set(df, 1.F);

@@ -21,6 +21,7 @@
 #include <hwy/highway.h>
 
 #include <sgf/stereo/band.h>
+#include <sgf/stereo/vector_tag-inl.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace sgf::stereo::internal {
@@ -40,7 +41,7 @@ struct SumTraits {
 
 template <class T>
 HWY_INLINE int LanesOf() {
-  return static_cast<int>(hn::Lanes(hn::ScalableTag<T>()));
+  return static_cast<int>(hn::Lanes(VectorTag<T>()));
 }
 
 // out[p] = op over the lanes of the vector at vectors + p * lanes, for eight pixels p.
@@ -49,7 +50,7 @@ HWY_INLINE void ReduceEach(const T* vectors, T* out, Op op) {
   const int lanes = LanesOf<T>();
 #if HWY_TARGET != HWY_SCALAR
   if constexpr (sizeof(T) == 2) {
-    const hn::ScalableTag<T> d;
+    const VectorTag<T> d;
     // Each fold halves the lanes per pixel in every 128-bit block and doubles the pixels; after
     // three, a block holds one lane of each pixel, in order.
     const auto load = [&](int p) HWY_ATTR { return hn::Load(d, vectors + p * lanes); };
@@ -105,9 +106,9 @@ class WinnerFinder {
   // Where the caller leaves the lane-wise minimum of pixel p's sums.
   Sum* Least(int p) { return lanes_.get() + p * LanesOf<Sum>(); }
 
-  // sums[p] are followed and preceded by three readable values; those from index `end` on are kMax.
-  HWY_INLINE void Find(const std::array<const Sum*, kPixels>& sums, int count,
-                       int end, Winners<Sum>& winners) {
+  // sums[p] stand between at least eight values of kMax; those from index `end` on are kMax too.
+  HWY_INLINE void Find(const std::array<const Sum*, kPixels>& sums, int count, int end,
+                       Winners<Sum>& winners) {
     ReduceEach(Least(0), winners.least, [](auto a, auto b) HWY_ATTR { return hn::Min(a, b); });
     SetLimits(winners);
     for (int p = 0; p < count; ++p) CountBelow(sums[p], end, winners.limit[p], p);
@@ -120,7 +121,7 @@ class WinnerFinder {
  private:
   static constexpr int kFirstRank = std::numeric_limits<int16_t>::max();
   static constexpr int kBlock = kPixels * HWY_MAX_BYTES / static_cast<int>(sizeof(Sum));
-  using D = hn::ScalableTag<Sum>;
+  using D = VectorTag<Sum>;
 
   Sum* First(int p) { return lanes_.get() + kBlock + p * LanesOf<Sum>(); }
   Sum* Close(int p) { return lanes_.get() + 2 * kBlock + p * LanesOf<Sum>(); }
@@ -294,7 +295,7 @@ class RightView {
   // shifted by a lane. Sums need kPixels + lanes values of kMax around them.
   HWY_INLINE void Add(int x, int count, const std::array<const Sum*, kPixels>& sums,
                       const Winners<Sum>& winners) {
-    const hn::ScalableTag<Sum> d;
+    const VectorTag<Sum> d;
     for (int p = 0; p < count; ++p) left_[x + p] = winners.accepted[p] ? winners.index[p] : -1;
     Sum* least = least_.data() + Right(x);
     Sum* index = index_.data() + Right(x);

@@ -15,8 +15,8 @@
 #include <vector>
 
 #include <benchmark/benchmark.h>
-#include <malloc.h>
 #include <fmt/core.h>
+#include <malloc.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -144,7 +144,7 @@ int Run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return sgf::Run(argc, argv);
-  } catch (const sgf::Error& error) {
+  } catch (const std::exception& error) {
     std::cerr << "stereo_bench: " << error.what() << '\n';
     return 2;
   }

@@ -44,17 +44,31 @@ def values(frame, region, quantity):
     return chosen.set_index("cost")["measured"]
 
 
+def common_scenes(table):
+    """Scores of the scenes that both runs have, side by side; `_merge` says who has a line."""
+    run, reference = (read(folder, f"{table}_scenes") for folder in (TABLES, REFERENCE))
+    scenes = run[["dataset", "scene"]].merge(reference[["dataset", "scene"]]).drop_duplicates()
+    keys = ["dataset", "scene", "region", "matcher", "cost", "window", "uniqueness"]
+    names = {"on": keys, "how": "outer", "suffixes": ("", "_reference"), "indicator": True}
+    return run.merge(scenes).merge(reference.merge(scenes), **names)
+
+
+@pytest.mark.parametrize("table", ["table1", "table2"])
+def test_a_common_scene_has_the_same_lines(table):
+    both = common_scenes(table)
+    assert not both.empty
+    only_one = both[both["_merge"] != "both"]
+    assert only_one.empty, only_one[["dataset", "scene", "region", "cost", "_merge"]].to_string()
+
+
 @pytest.mark.parametrize("table", ["table1", "table2"])
 @pytest.mark.parametrize("quantity", SCORES)
 def test_scene_scores_equal_the_reference(table, quantity):
-    keys = ["dataset", "scene", "region", "matcher", "cost", "window", "uniqueness"]
-    run, reference = (read(folder, f"{table}_scenes") for folder in (TABLES, REFERENCE))
-    both = run.merge(reference, on=keys, suffixes=("", "_reference"))
-    assert not both.empty
+    both = common_scenes(table)
+    assert both[quantity].isna().equals(both[f"{quantity}_reference"].isna())
     difference = (both[quantity] - both[f"{quantity}_reference"]).abs()
     worst = both.loc[difference.idxmax()]
     assert difference.max() <= tolerance(quantity), worst.to_dict()
-    assert both[quantity].isna().equals(both[f"{quantity}_reference"].isna())
 
 
 @pytest.mark.parametrize("table", ["table1", "table2"])
@@ -94,6 +108,14 @@ def test_sgf_is_first_on_middlebury_at_equal_density(quantity):
     compared = wide[["sgf", *OTHERS]].dropna()
     assert len(compared) >= 3
     assert (compared["sgf"] < compared[OTHERS].min(axis="columns")).all(), compared
+
+
+@pytest.mark.parametrize(
+    "quantity, bound", [("mean_px", 1.09), ("bad2_pct", 7.7), ("bad4_pct", 2.5), ("invalid_pct", 52)]
+)
+def test_sgf_on_kitti_is_within_its_bounds(quantity, bound):
+    table = require_dataset(read(TABLES, "table2"), "kitti2015")
+    assert values(table, "noc", quantity)["sgf"] <= bound
 
 
 @pytest.mark.parametrize("quantity", ["mean_px", "bad2_pct", "bad4_pct", "d1_pct"])

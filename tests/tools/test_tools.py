@@ -129,7 +129,9 @@ def test_bad_images_are_named(scene, pair, tmp_path):
     assert fails(run("sgf_stereo", cut, pair[1], "-o", out), cut)
     small = tmp_path / "small.png"
     Image.fromarray(np.zeros((30, 50), np.uint8)).save(small)
-    assert fails(run("sgf_stereo", pair[0], small, "-o", out), "50x30", "100x60")
+    for method in ("bm", "opencv_bm"):
+        result = run("sgf_stereo", pair[0], small, "-o", out, "--method", method)
+        assert fails(result, "50x30", "100x60")
     assert fails(run("sgf_stereo", small, small, "-o", out, "--window", 31), "window", "31", "50x30")
     assert not out.exists()
 
@@ -158,6 +160,13 @@ def test_bad_truth_is_named_and_leaves_nothing_behind(pair, tmp_path):
         (["--uniqueness", "-1"], ["uniqueness", "-1"]),
         (["--method", "magic"], ["magic", "opencv_bm"]),
         (["--isa", "mmx"], ["mmx"]),
+        (["--method", "opencv_bm", "--uniqueness", "-3"], ["uniqueness", "-3"]),
+        (["--method", "opencv_bm", "--uniqueness", "2.5"], ["uniqueness", "2.5"]),
+        (["--method", "opencv_bm", "--window", "257"], ["window", "257"]),
+        (["--method", "opencv_bm", "--max-disp", "0"], ["num_disparities", "0"]),
+        (["--method", "opencv_bm", "--metric", "sgf"], ["metric", "opencv_bm"]),
+        (["--layout", "kitti2015"], ["--layout"]),
+        (["--gt-scale", "4"], ["--gt-scale"]),
     ],
 )
 def test_bad_options_are_named(pair, tmp_path, flags, parts):
@@ -179,6 +188,19 @@ def test_bad_datasets_are_named(scene, tmp_path):
     (scene / "calib.txt").write_text("width=100\n")
     assert fails(run("sgf_stereo", scene.parent, "-o", out), scene / "calib.txt", "ndisp")
     assert not out.exists()
+
+
+def test_flags_that_would_have_no_effect_on_a_folder_are_errors(scene, tmp_path):
+    truth = scene / "disp0GT.pfm"
+    assert fails(run("sgf_stereo", scene.parent, "-o", tmp_path / "out", "--gt", truth), "--gt")
+    run("sgf_stereo", scene.parent, "-o", tmp_path / "out", "--max-disp", 9)
+    assert "num_disparities: 9" in (tmp_path / "out" / "Wall" / "options.yaml").read_text()
+
+
+def test_an_output_that_is_a_file_is_an_error(pair, tmp_path):
+    (tmp_path / "out").write_text("kept")
+    assert fails(run("sgf_stereo", *pair, "-o", tmp_path / "out"), tmp_path / "out")
+    assert (tmp_path / "out").read_text() == "kept"
 
 
 def test_a_wrong_command_line_ends_with_2(pair):
@@ -224,6 +246,8 @@ def test_bad_sweeps_are_named(sweep, tmp_path):
     file = tmp_path / "sweep.yaml"
     file.write_text(file.read_text().replace("metric: sgf", "metrik: sgf"))
     assert fails(run("sgf_eval", *sweep, "--column", "sgf"), f"{file}:4", "metrik")
+    file.write_text(file.read_text().replace("matcher: stereo_bm", "matcher: {}"))
+    assert fails(run("sgf_eval", *sweep, "--column", "orig"), f"{file}:2")
     assert fails(run("sgf_eval", *sweep[:-4], "--dataset", "bridges", "--out", "x", "--column", "sgf"), "bridges")
     assert not (tmp_path / "raw.csv").exists()
 

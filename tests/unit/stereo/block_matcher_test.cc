@@ -7,6 +7,7 @@
 #include <support/error_message.h>
 #include <support/stereo_images.h>
 
+#include <sgf/core/error.h>
 #include <sgf/metrics/registry.h>
 #include <sgf/stereo/block_matcher.h>
 
@@ -194,6 +195,7 @@ TEST(BlockMatcher, RejectsImagesThatDoNotFit) {
   EXPECT_EQ(message(cv::Mat(8, 40, CV_8U), cv::Mat(8, 40, CV_8U)),
             "window: 9 exceeds the image of 40x8");
   EXPECT_TRUE(out.empty());
+  EXPECT_THROW(matcher.Filter(Matches{}, good, 100), Error);
 }
 
 TEST(BlockMatcher, RejectsAPatchMetricAndAPrefilterOnFloats) {

@@ -154,7 +154,7 @@ TEST(SgfKernel, SumsOfTheLargestCostsFitTheirLanes) {
   BlockMatcherOptions options;
   options.num_disparities = 20;
   options.uniqueness_pct = 0;
-  for (const int window : {9, 15, 21, 31, 39}) {
+  for (const int window : {9, 15, 21, 23, 31, 39}) {
     options.window = window;
     cv::Mat1s disparity;
     BlockMatcher(options).Compute(left, right, disparity);

@@ -22,7 +22,7 @@ TEST(BlockMatcherOptions, RejectsWhatIsOutOfRangeWithNameAndValue) {
             "num_disparities: must be in [1, 2048], got 0");
   EXPECT_EQ(MessageFor([](auto& o) { o.num_disparities = 5000; }),
             "num_disparities: must be in [1, 2048], got 5000");
-  EXPECT_EQ(MessageFor([](auto& o) { o.window = 0; }), "window: must be in [1, 101], got 0");
+  EXPECT_EQ(MessageFor([](auto& o) { o.window = 0; }), "window: must be in [1, 51], got 0");
   EXPECT_EQ(MessageFor([](auto& o) { o.window = 8; }), "window: must be odd, got 8");
   EXPECT_EQ(MessageFor([](auto& o) { o.uniqueness_pct = 100; }),
             "uniqueness_pct: must be in [0, 99], got 100");
