@@ -23,6 +23,8 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --only NAME...  only these experiments (see --list)
   --data DIR      folder with downloaded data sets; default: environment variable SGF_DATA, or none.
                   Without it the pairs that Debian packages ship are used.
+  --full          render the full suite of eleven sequences (15 GB at most) instead of the short one
+                  of four (2 GB at most)
   --jobs N        parallel jobs; default: the number of processors
   --list          list the experiments and stop
   --clean         remove what was built and generated (not results/reference) and stop
@@ -178,9 +180,9 @@ run_experiments() {
   echo "== packages [run] [report]"
   install_packages run report
   echo "== build"
-  build "$(tests_in_build)" sgf_eval sgf_stereo stereo_bench
+  build "$(tests_in_build)" sgf_eval sgf_render sgf_stereo sgf_study stereo_bench
   cd paper
-  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${stages[@]}"
+  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${stages[@]}"
 }
 
 run_tests() {
@@ -197,6 +199,7 @@ run_tests() {
 
 mode=run
 stages=()
+full=()
 data=${SGF_DATA:-}
 jobs=$(nproc)
 
@@ -216,6 +219,7 @@ while (($#)); do
       data=$2
       shift
       ;;
+    --full) full=(--full) ;;
     --jobs)
       [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || wrong_usage "--jobs needs a positive number, not '${2:-}'"
       jobs=$2

@@ -7,6 +7,7 @@ names the file.
 from __future__ import annotations
 
 from dataclasses import MISSING, dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, Union
 
@@ -17,6 +18,7 @@ PROJECT = PAPER.parent
 EXPERIMENTS = PAPER / "experiments"
 SWEEPS = PAPER / "sweeps"
 PUBLISHED = PAPER / "published.yaml"
+RECIPES = PROJECT / "datasets" / "synthetic"
 CATALOGUE = PROJECT / "datasets" / "catalogue.yaml"
 
 
@@ -185,7 +187,156 @@ class Benchmark:
         return folder if folder.is_dir() else None
 
 
-Experiment = Union[Table, Density, DisparityFigure, Benchmark]
+@dataclass(frozen=True)
+class SemiDenseRow:
+    """A row of panels: the points of a case, seen from where, coloured by what."""
+
+    title: str
+    case: str
+    view: str  # top or side
+    colour: str  # grey or error
+
+
+@dataclass(frozen=True)
+class SemiDenseColumn:
+    options: dict[str, Any]
+    extra: bool = False  # only a line of the table
+
+
+@dataclass
+class SemiDense:
+    """What `sgf_study semi-dense` runs and how its points are drawn."""
+
+    kind: str
+    name: str
+    title: str
+    pair: str  # below the folder of generated data sets
+    study: dict[str, Any]
+    cases: dict[str, Any]
+    rows: list[SemiDenseRow]
+    columns: dict[str, SemiDenseColumn]
+
+    @property
+    def drawn(self) -> list[str]:
+        """Names of the columns that the figure has, in order."""
+        return [name for name, column in self.columns.items() if not column.extra]
+
+    @property
+    def bad_pct(self) -> float:
+        """A depth is bad when off by more, in percent of the truth."""
+        return self.study["bad_pct"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """An image that is matched against a changed copy of itself."""
+
+    file: Path
+    generated: bool  # there once the pairs are rendered
+
+
+@dataclass(frozen=True)
+class FrameGroup:
+    """Images of one origin: downloaded, or views of the rendered pairs."""
+
+    name: str
+    title: str
+    frames: dict[str, str]  # by label the file below the folder of data, or of generated data
+    generated: bool = False
+    instead_of: str = ""  # group that this one stands in for
+
+    def files(self, root: Path) -> dict[str, Path]:
+        """Files by label. @param root the folder of data, or of generated data."""
+        return {label: root / file for label, file in self.frames.items()}
+
+
+@dataclass(frozen=True)
+class SelfMatchColumn:
+    metric: str
+    samples: dict[str, Any] = field(default_factory=dict)
+    pm: dict[str, Any] = field(default_factory=dict)
+    extra: bool = False  # not a column of the paper
+
+
+@dataclass
+class SelfMatch:
+    """What `sgf_study self-match` runs on each frame and how it is shown."""
+
+    kind: str
+    name: str
+    title: str
+    groups: list[FrameGroup]
+    published: str
+    published_group: str
+    figure_case: str
+    figure_columns: list[str]
+    matching: dict[str, Any]
+    columns: dict[str, SelfMatchColumn]
+    cases: dict[str, dict[str, Any]]
+    curves: dict[str, list[float]]
+
+    def present(self, data: str) -> list[FrameGroup]:
+        """The groups at hand: generated ones always are, downloaded ones where all files exist.
+
+        @param data folder with downloaded data, may be empty.
+        """
+        found = []
+        for group in self.groups:
+            files = group.files(Path(data)).values()
+            there = group.generated or data and all(file.exists() for file in files)
+            if there and group.instead_of not in [other.name for other in found]:
+                found.append(group)
+        return found
+
+    def frames(self, generated: Path, data: str) -> dict[str, Frame]:
+        """All frames at hand by `group_frame`."""
+        return {
+            f"{group.name}_{label}": Frame(file, group.generated)
+            for group in self.present(data)
+            for label, file in group.files(generated if group.generated else Path(data)).items()
+        }
+
+
+@dataclass
+class ShiftProfile:
+    """What `sgf_study shift-profile` runs."""
+
+    kind: str
+    name: str
+    title: str
+    study: dict[str, Any]
+
+
+@dataclass
+class ContactSheet:
+    """Views of the synthetic scenes."""
+
+    kind: str
+    name: str
+    title: str
+    scenes: dict[str, list[str]]  # names of views
+
+
+@dataclass
+class Sequences:
+    """Stereo-inertial sequences: recipes of datasets/synthetic."""
+
+    kind: str
+    name: str
+    title: str
+    short: list[str]
+    full: list[str]
+
+    def suite(self, full: bool) -> list[str]:
+        return self.full if full else self.short
+
+    def recipes(self, full: bool) -> list[Path]:
+        return [RECIPES / f"{name}.yaml" for name in self.suite(full)]
+
+
+Experiment = Union[
+    ContactSheet, Sequences, Table, Density, DisparityFigure, Benchmark, SemiDense, SelfMatch, ShiftProfile
+]
 
 
 @dataclass(frozen=True)
@@ -251,20 +402,62 @@ def _build_figure(node: dict[str, Any], where: str) -> DisparityFigure:
     return figure
 
 
+def _build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
+    figure = _build(SemiDense, node, where)
+    figure.rows = [_build(SemiDenseRow, row, f"{where}: rows") for row in figure.rows]
+    figure.columns = {
+        name: _build(SemiDenseColumn, column, f"{where}: columns.{name}")
+        for name, column in figure.columns.items()
+    }
+    for key in ("min_gradient", "min_epipolar_gradient", "bad_pct"):
+        if key not in figure.study:
+            raise ConfigError(f"{where}: study: key '{key}' is missing")
+    for row in figure.rows:
+        known = {"case": figure.cases, "view": ("top", "side"), "colour": ("grey", "error")}
+        for key, names in known.items():
+            if getattr(row, key) not in names:
+                raise ConfigError(f"{where}: rows: {key} '{getattr(row, key)}' is unknown")
+    return figure
+
+
+def _build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
+    figure = _build(SelfMatch, node, where)
+    figure.groups = [_build(FrameGroup, group, f"{where}: groups") for group in figure.groups]
+    figure.columns = {
+        name: _build(SelfMatchColumn, column, f"{where}: columns.{name}")
+        for name, column in figure.columns.items()
+    }
+    if figure.figure_case not in figure.cases:
+        raise ConfigError(f"{where}: figure_case '{figure.figure_case}' is not among the cases")
+    if unknown := set(figure.figure_columns) - set(figure.columns):
+        raise ConfigError(f"{where}: figure_columns: no column {sorted(unknown)}")
+    wanted = {figure.published_group, *(group.instead_of for group in figure.groups)} - {""}
+    if unknown := wanted - {group.name for group in figure.groups}:
+        raise ConfigError(f"{where}: no group {sorted(unknown)}")
+    return figure
+
+
+BUILDERS = {
+    "benchmark": partial(_build, Benchmark),
+    "contact_sheet": partial(_build, ContactSheet),
+    "density": partial(_build, Density),
+    "disparity_figure": _build_figure,
+    "self_match": _build_self_match,
+    "semi_dense": _build_semi_dense,
+    "sequences": partial(_build, Sequences),
+    "shift_profile": partial(_build, ShiftProfile),
+    "table": _build_table,
+}
+
+
 def load_experiment(name: str) -> Experiment:
     """Reads paper/experiments/<name>.yaml; its `kind` says what it is."""
     path = EXPERIMENTS / f"{name}.yaml"
     node, where = read_yaml(path), str(path)
-    kind = node.get("kind")
-    if kind == "table":
-        return _build_table(node, where)
-    if kind == "density":
-        return _build(Density, node, where)
-    if kind == "disparity_figure":
-        return _build_figure(node, where)
-    if kind == "benchmark":
-        return _build(Benchmark, node, where)
-    raise ConfigError(f"{where}: kind is '{kind}'; known: table, density, disparity_figure, benchmark")
+    kind = str(node.get("kind"))
+    if kind not in BUILDERS:
+        raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(BUILDERS)}")
+    return BUILDERS[kind](node, where)
 
 
 def load_experiments(kind: str) -> dict[str, Any]:
@@ -281,6 +474,14 @@ def load_published(table: Table, matcher: str) -> dict[str, dict[str, float]]:
     return {
         quantity: dict(zip(entry["columns"], values)) for quantity, values in entry[matcher].items()
     }
+
+
+def load_published_errors(figure: SelfMatch) -> dict[str, list[float]]:
+    """The paper's mean errors (px) of Fig. 1 by column, one per frame of the paper."""
+    entry = read_yaml(PUBLISHED).get(figure.published)
+    if entry is None:
+        raise ConfigError(f"{PUBLISHED}: no entry {figure.published}")
+    return entry
 
 
 def dataset_flags(data: str, generated: str) -> list[str]:

@@ -37,6 +37,7 @@ class Settings:
     data: str  # empty: no downloaded data sets
     generated: Path
     jobs: int
+    full: bool  # the full suites of rendered sequences
 
     @property
     def logs(self) -> Path:
@@ -88,6 +89,8 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
         return any(config.load_experiment(table).present(datasets) for table in stage.tables)
     if stage.kind == "disparity_figure":
         return stage.group(datasets) is not None
+    if stage.kind in ("contact_sheet", "self_match", "semi_dense", "sequences", "shift_profile"):
+        return True  # rendered
     return stage.pair(datasets) is not None
 
 
@@ -97,6 +100,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
         "bin": settings.bin,
         "data": settings.data,
         "generated": settings.generated,
+        "full": int(settings.full),
     }
     return [
         PYTHON, "-m", "snakemake",
@@ -182,6 +186,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--generated", type=Path, default=config.PROJECT / "datasets" / "generated")
     parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
+    parser.add_argument("--full", action="store_true", help="full suites of sequences, not short ones")
     parser.add_argument("stages", nargs="+", help="names of experiments")
     return parser.parse_args()
 
@@ -199,6 +204,7 @@ def main() -> int:
         data=str(Path(arguments.data).resolve()) if arguments.data else "",
         generated=arguments.generated.resolve(),
         jobs=arguments.jobs,
+        full=arguments.full,
     )
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]

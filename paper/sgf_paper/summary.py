@@ -14,12 +14,22 @@ FILES = {
     "density": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _equal.csv)",
     "disparity_figure": "figures/{}.png (.pdf)",
     "benchmark": "tables/{}.md (.csv)",
+    "contact_sheet": "figures/{}.png (.pdf)",
+    "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
+    "shift_profile": "figures/{0}.png (.pdf), tables/{0}.csv (_minima.csv)",
 }
 MAIN_FILE = {
     "table": "tables/{}.csv",
     "density": "figures/{}.png",
     "disparity_figure": "figures/{}.png",
     "benchmark": "tables/{}.csv",
+    "contact_sheet": "figures/{}.png",
+    "sequences": "tables/{}.csv",
+    "semi_dense": "tables/{}.csv",
+    "self_match": "tables/{}.csv",
+    "shift_profile": "tables/{}.csv",
 }
 
 
@@ -60,11 +70,40 @@ def _bench_lines(path: Path) -> list[str]:
     return lines
 
 
+def _semi_dense_lines(path: Path, drawn: list[str]) -> list[str]:
+    """Per case, the drawn columns' points kept and how far off these are."""
+    scores = pd.read_csv(path)
+    lines = []
+    for case, rows in scores[scores["column"].isin(drawn)].groupby("case", sort=False):
+        texts = [
+            f"{row.column} {row.kept_pct:.0f} %, {100 * row.median_m:.1f} / {100 * row.p90_m:.1f} cm"
+            for row in rows.itertuples()
+        ]
+        lines.append(f"{case}, kept, median / 90th percentile of depth errors: {'; '.join(texts)}")
+    return lines
+
+
+def _self_match_lines(path: Path) -> list[str]:
+    """Per group and case, the paper's columns by mean error over the frames, first range."""
+    frame = pd.read_csv(path)
+    first = frame[(frame["first_disparity"] == frame["first_disparity"].iloc[0]) & ~frame["extra"]]
+    lines = []
+    for (group, case), rows in first.groupby(["group", "case"], sort=False):
+        means = rows.groupby("cost")["mean_px"].mean().sort_values()
+        texts = [f"{cost} {mean:.2f}" for cost, mean in means.items()]
+        lines.append(f"{group} {case}, mean px: {', '.join(texts)}")
+    return lines
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
     if stage.kind == "benchmark":
         return _bench_lines(main_file(stage, results))
+    if stage.kind == "semi_dense":
+        return _semi_dense_lines(main_file(stage, results), stage.drawn)
+    if stage.kind == "self_match":
+        return _self_match_lines(main_file(stage, results))
     return []
 
 

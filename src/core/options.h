@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <set>
 #include <span>
 #include <string>
@@ -22,13 +25,17 @@
 ///     };
 ///
 /// and that list alone drives reading, writing, command-line flags and documentation. A field may
-/// be a number, bool, string, an enum with EnumNames(), a vector of those, or nested options.
+/// be a number, bool, string, an enum with EnumNames(), a vector of those, nested options, or a
+/// vector of options.
 namespace sgf {
 
 template <class T>
 concept OptionsStruct = requires(T t) {
   t.VisitFields([](auto&&...) {});
 };
+
+template <class T>
+concept OptionsList = OptionsStruct<typename T::value_type>;
 
 /// One line of the documentation of an options struct.
 struct OptionDoc {
@@ -46,7 +53,13 @@ inline std::string At(const std::string& file, const YAML::Node& node) {
 
 template <class T>
 std::string FormatValue(const T& value) {
-  if constexpr (std::is_enum_v<T>) {
+  if constexpr (OptionsStruct<T>) {
+    std::string text;
+    T(value).VisitFields([&](const char* name, auto& field, const char*, const char*) {
+      text += fmt::format("{}{}: {}", text.empty() ? "" : ", ", name, FormatValue(field));
+    });
+    return "{" + text + "}";
+  } else if constexpr (std::is_enum_v<T>) {
     for (const auto& [name, v] : EnumNames(value))
       if (v == value) return name;
     return "?";
@@ -56,6 +69,8 @@ std::string FormatValue(const T& value) {
     std::string text = "[";
     for (const auto& v : value) text += (text.size() > 1 ? ", " : "") + FormatValue(v);
     return text + "]";
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return std::isinf(value) ? (value < 0 ? "-.inf" : ".inf") : fmt::format("{}", value);
   } else {
     return fmt::format("{}", value);
   }
@@ -89,9 +104,17 @@ void ParseValue(const YAML::Node& node, const std::string& key, const std::strin
   }
 }
 
+template <class List>
+void ReadOptionsList(const YAML::Node& node, const std::string& key, const std::string& file,
+                     List& list);
+
+template <class List>
+YAML::Node WriteOptionsList(const List& list);
+
 }  // namespace options_internal
 
-/// Sets the fields named in a YAML map; others keep their value.
+/// Sets the fields named in a YAML map; others keep their value. A list of options is replaced as a
+/// whole.
 /// @param file what error messages call the source.
 /// @throws Error naming file, line and key for an unknown key or an unreadable value.
 template <OptionsStruct O>
@@ -103,8 +126,11 @@ void ReadOptions(const YAML::Node& map, O& options, const std::string& file) {
     known.insert(name);
     const YAML::Node node = map[name];
     if (!node) return;
-    if constexpr (OptionsStruct<std::remove_cvref_t<decltype(value)>>)
+    using T = std::remove_cvref_t<decltype(value)>;
+    if constexpr (OptionsStruct<T>)
       ReadOptions(node, value, file);
+    else if constexpr (OptionsList<T>)
+      options_internal::ReadOptionsList(node, name, file, value);
     else
       options_internal::ParseValue(node, name, file, value);
   });
@@ -112,6 +138,18 @@ void ReadOptions(const YAML::Node& map, O& options, const std::string& file) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : YAML::Dump(entry.first);
     if (!known.contains(key))
       throw Error(options_internal::At(file, entry.first), fmt::format("unknown key '{}'", key));
+  }
+}
+
+template <class List>
+void options_internal::ReadOptionsList(const YAML::Node& node, const std::string& key,
+                                       const std::string& file, List& list) {
+  if (!node.IsSequence()) throw Error(At(file, node), fmt::format("{} has to be a list", key));
+  list.clear();
+  for (const YAML::Node& item : node) {
+    if (!item.IsMap())
+      throw Error(At(file, item), fmt::format("expected a map of options in {}", key));
+    ReadOptions(item, list.emplace_back(), file);
   }
 }
 
@@ -123,6 +161,8 @@ YAML::Node WriteOptions(O options) {
     using T = std::remove_cvref_t<decltype(value)>;
     if constexpr (OptionsStruct<T>)
       map[name] = WriteOptions(value);
+    else if constexpr (OptionsList<T>)
+      map[name] = options_internal::WriteOptionsList(value);
     else if constexpr (std::is_enum_v<T>)
       map[name] = options_internal::FormatValue(value);
     else
@@ -131,16 +171,28 @@ YAML::Node WriteOptions(O options) {
   return map;
 }
 
-/// Documentation of all fields with the values that `options` holds as defaults.
+template <class List>
+YAML::Node options_internal::WriteOptionsList(const List& list) {
+  YAML::Node sequence(YAML::NodeType::Sequence);
+  for (const auto& item : list) sequence.push_back(WriteOptions(item));
+  return sequence;
+}
+
+/// Documentation of all fields with the values that `options` holds as defaults. After a list of
+/// options come the fields of its items, named "list[].field".
 template <OptionsStruct O>
 std::vector<OptionDoc> DescribeOptions(O options, const std::string& prefix = "") {
   std::vector<OptionDoc> docs;
   options.VisitFields([&](const char* name, auto& value, const char* unit, const char* text) {
-    if constexpr (OptionsStruct<std::remove_cvref_t<decltype(value)>>) {
-      for (auto& doc : DescribeOptions(value, prefix + name + ".")) docs.push_back(std::move(doc));
-    } else {
+    using T = std::remove_cvref_t<decltype(value)>;
+    std::vector<OptionDoc> inner;
+    if constexpr (OptionsStruct<T>)
+      inner = DescribeOptions(value, prefix + name + ".");
+    else
       docs.push_back({prefix + name, options_internal::FormatValue(value), unit, text});
-    }
+    if constexpr (OptionsList<T>)
+      inner = DescribeOptions(typename T::value_type(), prefix + name + "[].");
+    std::move(inner.begin(), inner.end(), std::back_inserter(docs));
   });
   return docs;
 }

@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 
 #include <fmt/core.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include <sgf/core/error.h>
+#include <sgf/io/atomic_file.h>
 #include <sgf/io/calib.h>
 #include <sgf/io/disparity.h>
 #include <sgf/io/image.h>
@@ -170,6 +172,42 @@ cv::Mat1f VisibleTruth(const StereoScene& scene, const cv::Mat1f& truth_all) {
   return truth;
 }
 
+// --- Writing a Middlebury scene ---
+
+constexpr uchar kVisible = 255, kOccluded = 128;
+
+void RequireCalibSize(const fs::path& folder, const char* what, const cv::Mat& image,
+                      const MiddleburyCalib& calib) {
+  const cv::Size size(calib.width, calib.height);
+  if (image.size() != size)
+    throw Error(folder.string(), fmt::format("{} is {}, the calibration's size {}", what,
+                                             SizeText(image.size()), SizeText(size)));
+}
+
+cv::Mat1b VisibilityMask(const StereoPair& pair) {
+  cv::Mat1b mask = cv::Mat1b::zeros(pair.truth_all.size());
+  mask.setTo(kOccluded, pair.truth_all == pair.truth_all);  // NaN equals nothing
+  mask.setTo(kVisible, pair.truth_noc == pair.truth_noc);
+  return mask;
+}
+
+// Text of calib.txt; its vmin and vmax are the least and largest true disparity, rounded outwards.
+std::string CalibText(const fs::path& folder, const cv::Mat1f& truth, const MiddleburyCalib& c) {
+  double smallest = 0, largest = 0;
+  const cv::Mat known = truth == truth;
+  if (cv::countNonZero(known) == 0)
+    throw Error(folder.string(), "the ground truth knows no disparity");
+  cv::minMaxLoc(truth, &smallest, &largest, nullptr, nullptr, known);
+  const auto camera = [&](double cx) {
+    return fmt::format("[{} 0 {}; 0 {} {}; 0 0 1]", c.f, cx, c.f, c.cy);
+  };
+  return fmt::format(
+      "cam0={}\ncam1={}\ndoffs={}\nbaseline={}\nwidth={}\nheight={}\nndisp={}\nisint=0\n"
+      "vmin={}\nvmax={}\ndyavg=0\ndymax=0\n",
+      camera(c.cx), camera(c.cx + c.doffs), c.doffs, 1000 * c.baseline_m, c.width, c.height,
+      c.ndisp, std::floor(smallest), std::ceil(largest));
+}
+
 }  // namespace
 
 std::span<const std::pair<const char*, StereoLayout>> EnumNames(StereoLayout) {
@@ -198,6 +236,13 @@ std::vector<StereoScene> ListStereoScenes(const fs::path& folder, StereoLayout l
   return scenes;
 }
 
+StereoScene FindMiddleburyScene(const fs::path& folder) {
+  std::error_code ignored;
+  if (!fs::is_directory(folder, ignored)) throw Error(folder.string(), "folder does not exist");
+  const fs::path named = folder.has_filename() ? folder : folder.parent_path();
+  return MiddleburyScene(named, StereoLayout::kMiddleburyEval3);
+}
+
 StereoPair LoadStereoScene(const StereoScene& scene) {
   StereoPair pair;
   pair.name = scene.name;
@@ -210,6 +255,27 @@ StereoPair LoadStereoScene(const StereoScene& scene) {
                        ? VisibleTruth(scene, pair.truth_all)
                        : ReadTruth(scene, scene.truth_noc, pair.left.size());
   return pair;
+}
+
+void WriteMiddleburyScene(const fs::path& folder, const StereoPair& pair,
+                          const MiddleburyCalib& calib) {
+  for (const auto& [what, image] :
+       {std::pair<const char*, const cv::Mat*>{"left image", &pair.left},
+        {"right image", &pair.right},
+        {"truth_all", &pair.truth_all},
+        {"truth_noc", &pair.truth_noc}})
+    RequireCalibSize(folder, what, *image, calib);
+  const std::string calib_text = CalibText(folder, pair.truth_all, calib);
+  std::error_code failure;
+  fs::create_directories(folder, failure);
+  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
+  WritePng(folder / "im0.png", pair.left);
+  WritePng(folder / "im1.png", pair.right);
+  WriteDisparityPfm(folder / "disp0GT.pfm", pair.truth_all);
+  WritePng(folder / "mask0nocc.png", VisibilityMask(pair));
+  AtomicFile file(folder / "calib.txt");
+  file.Write(calib_text);
+  file.Commit();
 }
 
 }  // namespace sgf

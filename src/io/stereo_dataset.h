@@ -9,6 +9,8 @@
 
 #include <opencv2/core.hpp>
 
+#include <sgf/io/calib.h>
+
 namespace sgf {
 
 /// How a stereo dataset lies on disk. Ground truth is always that of the left image. Middlebury
@@ -63,10 +65,26 @@ struct StereoPair {
 /// @throws Error naming the folder when it is missing or holds no scene; for a bad calib.txt.
 std::vector<StereoScene> ListStereoScenes(const std::filesystem::path& folder, StereoLayout layout);
 
+/// The files of one scene in Middlebury's layout (kMiddleburyEval3); the scene has the folder's
+/// name. Images are not read, calib.txt is.
+/// @throws Error naming the folder when it is missing; for a bad calib.txt.
+StereoScene FindMiddleburyScene(const std::filesystem::path& folder);
+
 /// Reads the images of a scene. For Middlebury, truth_noc is truth_all where the mask is 255.
 /// @throws Error naming the file that is missing or cannot be read, whose size differs from the
 /// left
 ///   image's (with both sizes), or whose scale cannot be told from the image's size.
 StereoPair LoadStereoScene(const StereoScene& scene);
+
+/// Writes a scene in Middlebury's layout (kMiddleburyEval3), from which LoadStereoScene() gives the
+/// same pair back: im0.png, im1.png, disp0GT.pfm (infinity: unknown), mask0nocc.png (255 visible in
+/// both images, 128 occluded, 0 unknown) and, last, calib.txt. The folder is made if missing.
+/// @param pair images of 8 bits, grey or BGR; both ground truths, of which truth_noc has a value at
+///   the pixels visible in both images only. Its name and num_disparities are not used: the
+///   folder's name and `calib.ndisp` stand for them.
+/// @throws Error naming the folder when it cannot be made, an image or ground truth is missing or
+///   not of calib's size, or no disparity is known; and as WritePng(), WritePfm().
+void WriteMiddleburyScene(const std::filesystem::path& folder, const StereoPair& pair,
+                          const MiddleburyCalib& calib);
 
 }  // namespace sgf

@@ -81,6 +81,16 @@ class Project:
         file = self.bin / "calls"
         return file.read_text().splitlines() if file.exists() else []
 
+    def renderings(self):
+        """Commands of the stand-in for sgf_render, and the pairs and sequences it has made."""
+        file = self.bin / "renderings"
+        return file.read_text().splitlines() if file.exists() else []
+
+    def fail(self, what):
+        """Has a column of sgf_eval or a command of sgf_render fail; None: no more."""
+        self.bin.mkdir(parents=True, exist_ok=True)
+        (self.bin / "fail").write_text(what or "")
+
     def stub_log(self):
         return self.log.read_text() if self.log.exists() else ""
 

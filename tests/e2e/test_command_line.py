@@ -7,6 +7,7 @@ import pytest
 from conftest import PROJECT
 
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
+PROGRAMS = "sgf_eval sgf_render sgf_stereo sgf_study stereo_bench"
 APT_LINE = "sudo apt-get update && sudo apt-get install -y --no-install-recommends "
 
 
@@ -33,6 +34,7 @@ def test_the_four_sections_name_each_package_once():
 def test_help_and_list_need_nothing_built(project):
     code, output = project.run("--help")
     assert code == 0 and "--only NAME" in output and "./reproduce.sh test" in output
+    assert "--full  " in output
     code, output = project.run("--list")
     assert code == 0
     assert [line.split()[0] for line in output.splitlines()] == EXPERIMENTS
@@ -62,6 +64,12 @@ def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, mes
     assert code == 2
     assert message in output
     assert project.stub_log() == "" and not project.results.exists()
+
+
+@pytest.mark.parametrize("command", [["--list"], ["--clean"], ["test"], ["--only", "table1"]])
+def test_full_goes_with_everything(project, command):
+    code, output = project.run("--full", *command)
+    assert code == 0, output
 
 
 def test_a_data_folder_from_the_environment_must_exist(project):
@@ -128,7 +136,7 @@ def test_the_test_command_builds_all_and_ends_with_ctests_summary(project):
 def test_a_run_builds_only_the_programs_and_keeps_a_developers_tests(project):
     project.run("--only", "table1")
     assert "-DSGF_BUILD_TESTS=OFF" in project.stub_log()
-    assert re.search(r"--target sgf_eval sgf_stereo stereo_bench$", project.stub_log(), re.MULTILINE)
+    assert re.search(rf"--target {PROGRAMS}$", project.stub_log(), re.MULTILINE)
     project.run("test")
     project.log.unlink()
     project.run("--only", "table1")

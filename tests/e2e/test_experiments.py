@@ -3,20 +3,27 @@
 import csv
 import shutil
 
+import pytest
 import yaml
 
 from conftest import PROJECT
 
 SWEEP = yaml.safe_load((PROJECT / "paper" / "sweeps" / "stereo_bm.yaml").read_text())
 COLUMNS = list(SWEEP["columns"])
+EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
+RENDERED = ["fig1", "fig2", "fig3", "scenes", "sequences"]  # these need no data set
+SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
+PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5"]
 FILES = {
     "tables": [
         f"{table}{end}"
         for table in ("table1", "table2")
         for end in (".csv", ".md", ".tex", "_scenes.csv", "_tuned.csv", "_wins.csv")
     ]
-    + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"],
-    "figures": [f"{name}.{end}" for name in ("density", "fig4", "fig5") for end in ("pdf", "png")],
+    + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
+    + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
+    + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md"],
+    "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
 
 
@@ -37,17 +44,22 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     assert code == 0, output
     assert made(project) == {folder: sorted(names) for folder, names in FILES.items()}
     assert sorted(project.calls()) == sorted(f"debian_pairs {column}" for column in COLUMNS)
+    renderings = project.renderings()
+    assert renderings.count("pair") == renderings.count("sequence") == 1
     summary = output[output.index("== summary") :]
     assert "table1         made        tables/table1.md" in summary
     assert "debian_pairs all, 2 scenes, mean px: sgf" in summary
     assert "motorcycle_741x500: sgf 2.29 times cv::StereoBM (avx3, 1 thread)" in summary
+    assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
+    assert "checked, kept, median / 90th percentile of depth errors: sad 60 %, 1.0 / 20.0 cm" in summary
+    assert "sequences      made        figures/sequences.png (.pdf), tables/sequences.md" in summary
     assert "Data sets absent: middlebury2014_h (https://" in summary
 
     times = {path: path.stat().st_mtime_ns for path in project.results.glob("*/*.*")}
     code, output = project.run()
     assert code == 0
-    assert output.count("up to date") == 6 and " made " not in output
-    assert len(project.calls()) == len(COLUMNS)
+    assert output.count("up to date") == len(EXPERIMENTS) and " made " not in output
+    assert len(project.calls()) == len(COLUMNS) and project.renderings() == renderings
     unchanged = [p for p, t in times.items() if p.stat().st_mtime_ns == t and "logs" not in str(p)]
     assert len(unchanged) >= sum(map(len, FILES.values()))
 
@@ -130,8 +142,7 @@ def test_a_changed_sweep_or_table_makes_what_depends_on_it_anew(project):
 
 
 def test_a_failing_job_names_its_log_and_leaves_the_rest_standing(project):
-    project.bin.mkdir(parents=True)
-    (project.bin / "fail").write_text("pm")
+    project.fail("pm")
     code, output = project.run("--only", "table1", "fig4")
     log = project.results / "logs" / "scores_stereo_bm_debian_pairs_pm.log"
     assert code == 1
@@ -139,7 +150,7 @@ def test_a_failing_job_names_its_log_and_leaves_the_rest_standing(project):
     assert "| sgf_eval: column pm was told to fail" in output
     assert "table1         NOT MADE" in output and "fig4           made" in output
     assert len(project.calls()) == len(COLUMNS) - 1, "the other columns go on"
-    (project.bin / "fail").unlink()
+    project.fail(None)
     code, output = project.run("--only", "table1", "fig4")
     assert code == 0
     assert sorted(project.calls()) == sorted(f"debian_pairs {column}" for column in COLUMNS)
@@ -177,11 +188,15 @@ def test_two_runs_do_not_share_a_results_folder(project, interrupt):
     assert f"another run is at work in {project.results}" in output
 
 
-def test_what_has_no_data_is_left_out_and_said(project):
+def remove_debian_pairs(project):
     shutil.rmtree(project.root / "datasets" / "generated" / "debian_pairs")
     script = project.root / "datasets" / "debian_pairs.py"
     script.write_text("import sys\nsys.exit('Error: no pair is installed')\n")
-    code, output = project.run()
+
+
+def test_what_has_no_data_is_left_out_and_said(project):
+    remove_debian_pairs(project)
+    code, output = project.run("--only", "table1", "fig4")
     assert code == 1
     assert "Error: no pair is installed" in output and "no data set at hand" in output
     project.add_dataset("kitti2015", ["000000", "000001"])
@@ -191,3 +206,87 @@ def test_what_has_no_data_is_left_out_and_said(project):
         assert f"{name:14} left out: its data are not at hand" in output
     assert "table2         made" in output
     assert "debian_pairs (" in output[output.index("Data sets absent") :]
+
+
+def test_what_is_rendered_needs_no_data(project):
+    remove_debian_pairs(project)
+    code, output = project.run()
+    assert code == 0, output
+    for name in EXPERIMENTS:
+        state = "made  " if name in RENDERED else "left out"
+        assert f"  {name:14} {state}" in output
+    assert project.calls() == []
+    assert "debian_pairs (" in output[output.index("Data sets absent") :]
+
+
+def test_full_renders_the_full_suite_beside_the_short_one(project):
+    suites = {}
+    for flags in ([], ["--full"], []):
+        code, output = project.run("--only", "sequences", *flags)
+        assert code == 0 and "sequences      made" in output, output
+        table = rows(project.results / "tables" / "sequences.csv")
+        suites[bool(flags)] = {row["sequence"]: row["frames"] for row in table}
+        assert float(table[0]["length_m"]) == pytest.approx(0.95 if flags else 0.45, abs=0.01)
+    recipes = [path.stem for path in (PROJECT / "datasets" / "synthetic").glob("[MV]*.yaml")]
+    assert suites[False] == dict.fromkeys(SHORT, "10.000")
+    assert suites[True] == dict.fromkeys(sorted(recipes), "20.000") and len(recipes) == 11
+    generated = project.root / "datasets" / "generated"
+    assert sorted(path.name for path in (generated / "sequences").iterdir()) == SHORT
+    assert project.renderings() == ["sequence", *SHORT, "sequence --full", *sorted(recipes)]
+
+
+@pytest.mark.parametrize(
+    "command, log, lost",
+    [
+        ("pair", "pairs.log", ["fig1", "fig3", "scenes"]),
+        ("sequence", "sequences_run.log", ["sequences"]),
+    ],
+)
+def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):
+    project.fail(command)
+    code, output = project.run("--only", *RENDERED)
+    assert code == 1
+    stamp = {"pair": "pairs", "sequence": "sequences"}[command]
+    assert f": raw/{stamp}.done; log: {project.results / 'logs' / log}" in output
+    assert f"| sgf_render: {command} was told to fail" in output
+    for name in RENDERED:
+        assert f"  {name:14} {'NOT MADE' if name in lost else 'made  '}" in output
+    project.fail(None)
+    code, output = project.run("--only", *RENDERED)
+    assert code == 0, output
+    for name in RENDERED:
+        assert f"  {name:14} {'made  ' if name in lost else 'up to date'}" in output
+
+
+def test_a_changed_recipe_is_rendered_anew(project):
+    assert project.run("--only", "scenes", "sequences")[0] == 0
+    recipe = project.root / "datasets" / "synthetic" / "V1_02_medium.yaml"
+    recipe.write_text(recipe.read_text() + "# changed\n")
+    code, output = project.run("--only", "scenes", "sequences")
+    assert code == 0
+    assert "sequences      made" in output and "scenes         up to date" in output
+    recipe = recipe.with_name("pairs.yaml")
+    recipe.write_text(recipe.read_text() + "# changed\n")
+    code, output = project.run("--only", "scenes", "sequences")
+    assert code == 0
+    assert "scenes         made" in output and "sequences      up to date" in output
+    renderings = project.renderings()
+    assert renderings.count("pair") == renderings.count("sequence") == 2
+
+
+def test_downloaded_frames_join_the_generated_ones(project):
+    assert project.run("--only", "fig1")[0] == 0
+    scores = project.results / "raw" / "fig1" / "living_room_sofa.csv"
+    before = scores.stat().st_mtime_ns
+    folder = project.data / "icl_nuim" / "living_room_kt2" / "rgb"
+    folder.mkdir(parents=True)
+    for frame in ("120", "808"):
+        (folder / f"{frame}.png").write_bytes(b"")
+    code, output = project.run("--only", "fig1", "--data", str(project.data))
+    assert code == 0, output
+    table = rows(project.results / "tables" / "fig1.csv")
+    published = {(row["group"], row["frame"]): row["published"] for row in table if row["cost"] == "sgf"}
+    frames = [("living_room", "bookcases"), ("living_room", "sofa"), ("icl_kt2", "120"), ("icl_kt2", "808")]
+    assert list(published) == frames
+    assert scores.stat().st_mtime_ns == before
+    assert project.renderings().count("pair") == 1

@@ -13,7 +13,8 @@ ALLOWED = {
     "stereo": {"core", "metrics"},
     "io": {"core"},
     "eval": {"core"},
-    "apps": {"core", "metrics", "stereo", "io", "eval"},
+    "synth": {"core", "io", "eval"},
+    "apps": {"core", "metrics", "stereo", "io", "eval", "synth"},
 }
 
 

@@ -1,3 +1,7 @@
+#include <limits>
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,17 +19,29 @@ struct Inner {
   }
 };
 
+struct Item {
+  std::string name;
+  double to_s = std::numeric_limits<double>::infinity();
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("name", name, "", "a name");
+    visit("to_s", to_s, "s", "an end");
+  }
+};
+
 struct Outer {
   int window = 9;
   GradientOperator gradient = GradientOperator::kCentral;
   std::vector<int> sizes = {1, 2};
   Inner inner;
+  std::vector<Item> items;
   template <class V>
   void VisitFields(V&& visit) {
     visit("window", window, "px", "side");
     visit("gradient", gradient, "", "operator");
     visit("sizes", sizes, "px", "some sizes");
     visit("inner", inner, "", "nested");
+    visit("items", items, "", "a list");
   }
 };
 
@@ -72,12 +88,50 @@ TEST(Options, NamesFileLineAndKeyOfWhatIsWrong) {
 
 TEST(Options, DescribesEveryFieldWithDefaultUnitAndText) {
   const auto docs = DescribeOptions(Outer{});
-  ASSERT_EQ(docs.size(), 4U);
+  ASSERT_EQ(docs.size(), 7U);
   EXPECT_EQ(docs[0].name, "window");
   EXPECT_EQ(docs[0].default_value, "9");
   EXPECT_EQ(docs[0].unit, "px");
   EXPECT_EQ(docs[2].default_value, "[1, 2]");
   EXPECT_EQ(docs[3].name, "inner.ratio");
+  EXPECT_EQ(docs[4].name, "items");
+  EXPECT_EQ(docs[4].default_value, "[]");
+  EXPECT_EQ(docs[5].name, "items[].name");
+  EXPECT_EQ(docs[6].name, "items[].to_s");
+  EXPECT_EQ(docs[6].default_value, ".inf");
+  EXPECT_EQ(docs[6].unit, "s");
+}
+
+TEST(Options, ReadsAListOfOptionsInPlaceOfTheOldOne) {
+  Outer options;
+  options.items.resize(3);
+  ReadOptions(YAML::Load("items: [{name: a, to_s: 2}, {name: b}]"), options, "run.yaml");
+  ASSERT_EQ(options.items.size(), 2U);
+  EXPECT_EQ(options.items[0].name, "a");
+  EXPECT_EQ(options.items[0].to_s, 2);
+  EXPECT_EQ(options.items[1].name, "b");
+  EXPECT_EQ(options.items[1].to_s, Item().to_s);
+}
+
+TEST(Options, WritesAListOfOptionsAsItReadsIt) {
+  Outer options;
+  options.items = {{"a", 2}, {"b", Item().to_s}};
+  Outer copy;
+  ReadOptions(YAML::Load(YAML::Dump(WriteOptions(options))), copy, "copy");
+  ASSERT_EQ(copy.items.size(), 2U);
+  EXPECT_EQ(copy.items[0].name, "a");
+  EXPECT_EQ(copy.items[0].to_s, 2);
+  EXPECT_EQ(copy.items[1].to_s, Item().to_s);
+  EXPECT_EQ(DescribeOptions(options)[4].default_value,
+            "[{name: a, to_s: 2}, {name: b, to_s: .inf}]");
+}
+
+TEST(Options, NamesTheLineOfWhatIsWrongInAList) {
+  EXPECT_EQ(MessageOf("items:\n  - name: a\n  - nam: b"), "run.yaml:3: unknown key 'nam'");
+  EXPECT_EQ(MessageOf("items:\n  - to_s: late"),
+            "run.yaml:2: cannot read 'late' as the value of to_s");
+  EXPECT_EQ(MessageOf("window: 3\nitems: a"), "run.yaml:2: items has to be a list");
+  EXPECT_EQ(MessageOf("items:\n  - a"), "run.yaml:2: expected a map of options in items");
 }
 
 }  // namespace

@@ -94,7 +94,9 @@ void ParsesOrFails(const rc::Gen<Bytes>& files,
 }
 
 const Bytes kPfm = "Pf\n3 2\n-0.5\n" + Bytes(24, 'x');
-const Bytes kCalib = "cam0=[1500 0 199; 0 1500 187; 0 0 1]\ndoffs=52\nndisp=64\n";
+const Bytes kCalib =
+    "cam0=[1500 0 199; 0 1500 187; 0 0 1]\ndoffs=52\nbaseline=80\nwidth=450\nheight=375\n"
+    "ndisp=64\n";
 const Bytes kPng8 = Encode(".png", RandomImage(5, 7, CV_8UC3));
 const Bytes kPng16 = Encode(".png", RandomImage(5, 7, CV_16UC1));
 const Bytes kJpeg = Encode(".jpg", RandomImage(9, 10, CV_8UC3));
@@ -106,6 +108,7 @@ const Bytes kCatalogue =
 TEST(ParserProperty, MutationsStartFromValidFiles) {
   EXPECT_TRUE(Parses(kPfm, ReadPfm));
   EXPECT_TRUE(Parses(kCalib, ReadCalibNdisp));
+  EXPECT_TRUE(Parses(kCalib, ReadMiddleburyCalib));
   EXPECT_TRUE(Parses(kCatalogue, ReadCatalogue));
   EXPECT_TRUE(Parses(kPng8, ReadAnyImage));
   EXPECT_TRUE(Parses(kPng16, ReadAnyImage));
@@ -124,7 +127,7 @@ RC_GTEST_PROP(ParserProperty, CalibFromRandomBytes, ()) {
 }
 
 RC_GTEST_PROP(ParserProperty, CalibFromMutatedFiles, ()) {
-  ParsesOrFails(Mutated(kCalib), ReadCalibNdisp);
+  ParsesOrFails(Mutated(kCalib), ReadMiddleburyCalib);
 }
 
 RC_GTEST_PROP(ParserProperty, CatalogueFromRandomBytes, ()) {

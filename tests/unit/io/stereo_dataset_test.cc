@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -5,7 +6,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sgf/io/calib.h>
 #include <sgf/io/disparity.h>
+#include <sgf/io/image.h>
+#include <sgf/io/read_file.h>
 #include <sgf/io/stereo_dataset.h>
 
 #include "encoded_images.h"
@@ -17,6 +21,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::EndsWith;
+using ::testing::StartsWith;
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
@@ -238,6 +243,104 @@ TEST_F(StereoDatasetTest, NamesATruncatedTruth) {
   dir_.Write("Teddy/disp0GT.pfm", "Pf\n3 1\n-1\nabc");
   EXPECT_THAT(LoadMessage(StereoLayout::kMiddleburyEval3),
               EndsWith("disp0GT.pfm: truncated PFM: 3x1 values of 4 bytes, but 3 bytes of data"));
+}
+
+// --- Writing in Middlebury's layout ---
+
+class WriteMiddleburySceneTest : public ::testing::Test {
+ protected:
+  static cv::Mat Noise(int type) {
+    cv::Mat image(3, 4, type);
+    cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
+    return image;
+  }
+
+  // Visible but for an occluded pixel and one of unknown disparity.
+  static StereoPair Pair() {
+    StereoPair pair;
+    pair.left = Noise(CV_8UC3);
+    pair.right = 255 - pair.left;
+    pair.truth_all = (cv::Mat1f(3, 4) << 1.25, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12.5);
+    pair.truth_all(1, 2) = kNan;
+    pair.truth_noc = pair.truth_all.clone();
+    pair.truth_noc(2, 0) = kNan;
+    return pair;
+  }
+
+  static MiddleburyCalib Calib() { return {458.25, 1.5, 1.25, 0.75, 0.11, 4, 3, 64}; }
+
+  std::string Message(const StereoPair& pair, const MiddleburyCalib& calib) const {
+    return ErrorMessage([&] { WriteMiddleburyScene(folder_, pair, calib); });
+  }
+
+  const TempDir dir_;
+  const std::filesystem::path folder_ = dir_.path() / "pairs" / "room_0";
+};
+
+bool SameOrBothNan(float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+
+void ExpectSameTruth(const cv::Mat1f& a, const cv::Mat1f& b) {
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin(), SameOrBothNan)) << a << '\n' << b;
+}
+
+TEST_F(WriteMiddleburySceneTest, IsReadBackAsItWas) {
+  const StereoPair written = Pair();
+  WriteMiddleburyScene(folder_, written, Calib());
+  const StereoPair read = LoadStereoScene(FindMiddleburyScene(folder_));
+  EXPECT_EQ(read.name, "room_0");
+  EXPECT_EQ(read.num_disparities, 64);
+  EXPECT_EQ(cv::norm(read.left, written.left, cv::NORM_INF), 0);
+  EXPECT_EQ(cv::norm(read.right, written.right, cv::NORM_INF), 0);
+  ExpectSameTruth(read.truth_all, written.truth_all);
+  ExpectSameTruth(read.truth_noc, written.truth_noc);
+}
+
+TEST_F(WriteMiddleburySceneTest, MarksVisibleOccludedAndUnknownPixels) {
+  WriteMiddleburyScene(folder_, Pair(), Calib());
+  const cv::Mat1b mask = ReadGrey(folder_ / "mask0nocc.png");
+  const cv::Mat1b expected =
+      (cv::Mat1b(3, 4) << 255, 255, 255, 255, 255, 255, 0, 255, 128, 255, 255, 255);
+  EXPECT_EQ(cv::norm(mask, expected, cv::NORM_INF), 0) << mask;
+}
+
+TEST_F(WriteMiddleburySceneTest, WritesTheCalibrationInMiddleburysForm) {
+  WriteMiddleburyScene(folder_, Pair(), Calib());
+  EXPECT_EQ(ReadFile(folder_ / "calib.txt"),
+            "cam0=[458.25 0 1.5; 0 458.25 1.25; 0 0 1]\n"
+            "cam1=[458.25 0 2.25; 0 458.25 1.25; 0 0 1]\n"
+            "doffs=0.75\nbaseline=110\nwidth=4\nheight=3\nndisp=64\nisint=0\n"
+            "vmin=1\nvmax=13\ndyavg=0\ndymax=0\n");
+  const MiddleburyCalib read = ReadMiddleburyCalib(folder_ / "calib.txt");
+  EXPECT_EQ(read.f, 458.25);
+  EXPECT_EQ(read.cx, 1.5);
+  EXPECT_EQ(read.cy, 1.25);
+  EXPECT_EQ(read.doffs, 0.75);
+  EXPECT_DOUBLE_EQ(read.baseline_m, 0.11);
+  EXPECT_EQ(cv::Size(read.width, read.height), cv::Size(4, 3));
+  EXPECT_EQ(read.ndisp, 64);
+}
+
+TEST_F(WriteMiddleburySceneTest, NamesWhatIsMissingOrOfAnotherSizeAndWritesNothing) {
+  StereoPair pair = Pair();
+  pair.truth_noc.release();
+  EXPECT_EQ(Message(pair, Calib()),
+            folder_.string() + ": truth_noc is 0x0, the calibration's size 4x3");
+  MiddleburyCalib calib = Calib();
+  calib.width = 5;
+  EXPECT_EQ(Message(Pair(), calib),
+            folder_.string() + ": left image is 4x3, the calibration's size 5x3");
+  pair = Pair();
+  pair.truth_all.setTo(kNan);
+  EXPECT_EQ(Message(pair, Calib()), folder_.string() + ": the ground truth knows no disparity");
+  EXPECT_FALSE(std::filesystem::exists(folder_));
+}
+
+TEST_F(WriteMiddleburySceneTest, NamesAFolderThatCannotBeMadeOrFound) {
+  dir_.Write("pairs", "a file");
+  EXPECT_THAT(Message(Pair(), Calib()), StartsWith(folder_.string() + ": cannot be made: "));
+  EXPECT_EQ(ErrorMessage([&] { FindMiddleburyScene(folder_); }),
+            folder_.string() + ": folder does not exist");
 }
 
 }  // namespace

@@ -1,0 +1,73 @@
+#include <cmath>
+
+#include <fmt/core.h>
+#include <opencv2/imgproc.hpp>
+
+#include <sgf/apps/image_change.h>
+#include <sgf/core/error.h>
+#include <sgf/core/random.h>
+
+namespace sgf::apps {
+namespace {
+
+void Require(bool good, const char* option, const char* expected, double value) {
+  if (!good) throw Error(option, fmt::format("must be {}, got {}", expected, value));
+}
+
+// Local light, exposure and vignette: one factor per pixel.
+class Gain {
+ public:
+  Gain(cv::Size size, const ImageChange& change)
+      : change_(change),
+        centre_((size.width - 1) / 2.0, (size.height - 1) / 2.0),
+        light_(change.light_x * size.width - 0.5, change.light_y * size.height - 0.5),
+        corner2_(std::max(1.0, centre_.dot(centre_))),
+        sigma_px_(change.light_radius * std::hypot(size.width, size.height)) {}
+
+  double At(cv::Point2d pixel) const {
+    const cv::Point2d from_centre = pixel - centre_;
+    const cv::Point2d from_light = (pixel - light_) / sigma_px_;
+    const double light = 1 + change_.light * std::exp(-0.5 * from_light.dot(from_light));
+    const double r2 = from_centre.dot(from_centre) / corner2_;
+    return light * change_.exposure * (1 - change_.vignette * r2);
+  }
+
+ private:
+  ImageChange change_;
+  cv::Point2d centre_, light_;
+  double corner2_, sigma_px_;
+};
+
+}  // namespace
+
+void CheckChange(const ImageChange& c) {
+  for (const double value : {c.light_x, c.light_y, c.offset})
+    Require(std::isfinite(value), "light_x, light_y and offset", "finite", value);
+  Require(c.blur >= 0 && std::isfinite(c.blur), "blur", "finite and not negative", c.blur);
+  Require(c.light > -1 && std::isfinite(c.light), "light", "finite and above -1", c.light);
+  Require(c.light_radius > 0 && std::isfinite(c.light_radius), "light_radius",
+          "finite and positive", c.light_radius);
+  Require(c.exposure > 0 && std::isfinite(c.exposure), "exposure", "finite and positive",
+          c.exposure);
+  Require(c.vignette >= 0 && c.vignette < 1, "vignette", "in [0, 1)", c.vignette);
+  Require(c.noise >= 0 && std::isfinite(c.noise), "noise", "finite and not negative", c.noise);
+}
+
+cv::Mat ApplyChange(const cv::Mat1b& image, const ImageChange& change, uint64_t seed) {
+  CheckChange(change);
+  cv::Mat1d changed;
+  image.convertTo(changed, CV_64F);
+  if (change.blur > 0) cv::GaussianBlur(changed, changed, cv::Size(), change.blur);
+  const Gain gain(image.size(), change);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) {
+      const uint64_t index = static_cast<uint64_t>(y) * image.cols + x;
+      changed(y, x) = changed(y, x) * gain.At(cv::Point2d(x, y)) + change.offset;
+      if (change.noise > 0) changed(y, x) += change.noise * Gaussian(seed, index);
+    }
+  cv::Mat result;
+  changed.convertTo(result, change.quantise ? CV_8U : CV_32F);
+  return result;
+}
+
+}  // namespace sgf::apps

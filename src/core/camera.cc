@@ -1,0 +1,80 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <fmt/core.h>
+
+#include <sgf/core/camera.h>
+#include <sgf/core/error.h>
+
+namespace sgf {
+
+namespace {
+
+/// Distorted normalised coordinates and, if asked for, their derivative by the undistorted ones.
+Eigen::Vector2d Distort(const Camera& c, const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
+  const double x = n.x(), y = n.y(), r2 = n.squaredNorm();
+  const double radial = 1 + r2 * (c.k1 + r2 * c.k2);
+  if (J) {
+    const double slope = 2 * c.k1 + 4 * c.k2 * r2;  // d radial = slope * (x dx + y dy)
+    *J << radial + x * x * slope + 2 * c.p1 * y + 6 * c.p2 * x,
+        x * y * slope + 2 * c.p1 * x + 2 * c.p2 * y,  //
+        x * y * slope + 2 * c.p1 * x + 2 * c.p2 * y,
+        radial + y * y * slope + 6 * c.p1 * y + 2 * c.p2 * x;
+  }
+  return {x * radial + 2 * c.p1 * x * y + c.p2 * (r2 + 2 * x * x),
+          y * radial + c.p1 * (r2 + 2 * y * y) + 2 * c.p2 * x * y};
+}
+
+/// Squared radius (normalised, undistorted) from which the radial distortion moves points back
+/// inwards: the smallest positive root of the derivative of r (1 + k1 r^2 + k2 r^4), if any.
+double SquaredFoldRadius(const Camera& c) {
+  const double discriminant = 9 * c.k1 * c.k1 - 20 * c.k2;
+  const double divisor = discriminant < 0 ? 0 : std::sqrt(discriminant) - 3 * c.k1;
+  return divisor > 0 ? 2 / divisor : std::numeric_limits<double>::infinity();
+}
+
+[[noreturn]] void FailToUnproject(const Eigen::Vector2d& pixel) {
+  throw Error("camera", fmt::format("no ray for pixel ({}, {}): the distortion folds back there",
+                                    pixel.x(), pixel.y()));
+}
+
+}  // namespace
+
+Eigen::Vector2d Camera::Project(const Eigen::Vector3d& point) const {
+  const Eigen::Vector2d d = Distort(*this, point.hnormalized(), nullptr);
+  return {fx * d.x() + cx, fy * d.y() + cy};
+}
+
+Eigen::Vector3d Camera::Unproject(const Eigen::Vector2d& pixel) const {
+  const Eigen::Vector2d target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
+  if (!distorted()) return target.homogeneous();
+  Eigen::Vector2d n = target;
+  Eigen::Matrix2d J;
+  for (int iteration = 0; iteration < 50; ++iteration) {
+    const Eigen::Vector2d error = target - Distort(*this, n, &J);
+    if (error.norm() * std::max(fx, fy) < 1e-9) {
+      // Newton's method may have leapt over the fold to a ray that no lens maps here.
+      if (n.squaredNorm() >= SquaredFoldRadius(*this)) break;
+      return n.homogeneous();
+    }
+    if (J.determinant() <= 0) break;
+    n += J.inverse() * error;
+  }
+  FailToUnproject(pixel);
+}
+
+void Camera::Check() const {
+  if (width < 1 || height < 1)
+    throw Error("camera", fmt::format("size is {}x{} px; it has to be positive", width, height));
+  if (!(fx > 0 && fy > 0))
+    throw Error("camera",
+                fmt::format("focal lengths are {}, {} px; they have to be positive", fx, fy));
+  for (const double value : {fx, fy, cx, cy, k1, k2, p1, p2})
+    if (!std::isfinite(value))
+      throw Error("camera", fmt::format("a parameter is {}; all have to be finite", value));
+}
+
+}  // namespace sgf
