@@ -1,10 +1,12 @@
 // Renders the synthetic world: scenes as EXR images with all layers, stereo pairs, stereo-inertial
 // sequences, and camera images of layers rendered before.
 
+#include <charconv>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
@@ -85,11 +87,13 @@ std::vector<float> Strengths(const std::vector<std::string>& settings,
     if (group == groups.end())
       throw Error("--light", fmt::format("no light group in '{}'; known: {}", setting,
                                          fmt::join(groups, ", ")));
-    try {
-      strengths[group - groups.begin()] = std::stof(setting.substr(equals + 1));
-    } catch (const std::exception&) {
-      throw Error("--light", fmt::format("'{}' is not name=strength", setting));
-    }
+    float& strength = strengths[group - groups.begin()];
+    const char* end = setting.data() + setting.size();
+    const char* begin = equals == std::string::npos ? end : setting.data() + equals + 1;
+    const auto [rest, code] = std::from_chars(begin, end, strength);
+    if (code != std::errc() || rest != end || !(strength >= 0 && std::isfinite(strength)))
+      throw Error("--light",
+                  fmt::format("'{}' is not name=strength with a strength of 0 or more", setting));
   }
   return strengths;
 }
@@ -135,7 +139,11 @@ void RenderViews(const ViewsRequest& r) {
     const synth::Frame frame = renderer.Render(rays, T_world_cam);
     const std::string name = r.scene + "_" + view.name;
     WritePng(r.out / (name + ".png"), ForScreen(frame.Radiance(strengths)));
-    if (r.exr) WriteExr(r.out / (name + ".exr"), synth::ToExr(frame, camera, T_world_cam));
+    if (r.exr) {
+      ExrImage layers = synth::ToExr(frame, camera, T_world_cam);
+      layers.attributes = {{"scene", r.scene}, {"view", view.name}};
+      WriteExr(r.out / (name + ".exr"), layers);
+    }
     ++count;
   }
   if (count == 0) throw Error("--view", fmt::format("scene {} has no view '{}'", r.scene, r.view));
@@ -171,8 +179,11 @@ void RenderPairs(const PairsRequest& r) {
   ReadOptions(LoadYamlFile(r.recipe), list, r.recipe);
   const synth::RenderOptions options = r.quality.Options();
   Renderers renderers(options);
+  std::set<std::filesystem::path> folders;
   for (const synth::PairOptions& pair : list.pairs) {
     const std::filesystem::path folder = r.out / (pair.scene + "_" + pair.view);
+    if (!folders.insert(folder).second)
+      throw Error(r.recipe, fmt::format("two pairs of scene {}, view {}", pair.scene, pair.view));
     const std::string hash = synth::RecipeHash(pair, options, r.exr);
     if (IsComplete(folder, hash)) continue;
     const synth::RenderedPair rendered = synth::RenderPair(renderers.Of(pair.scene), pair);
@@ -215,63 +226,77 @@ void AddSequences(CLI::App& app, SequencesRequest& r) {
   app.add_option("--out", r.out, "folder for the sequences, each in EuRoC's layout")->required();
   app.add_flag("--full", r.full, "the full version instead of the short one");
   app.add_flag("--keep-exr", r.keep_exr, "also keep all layers of every frame");
-  app.add_option("--limit-gb", r.limit_gb, "most to write; default: 2, with --full 15");
+  app.add_option(
+      "--limit-gb", r.limit_gb,
+      "most to write; default: 2, with --full 15; --keep-exr takes up to 45 MB a stereo frame");
   r.quality.AddTo(app);
 }
 
-/// States what will be written and refuses what does not fit.
-void CheckSpace(const SequencesRequest& r, const std::vector<synth::SequenceRequest>& sequences) {
-  double bytes = 0;
+/// A sequence to render, and whether it is there already.
+struct SequenceJob {
+  synth::SequenceRequest request;
+  bool up_to_date = false;
+};
+
+/// States what will be written and refuses what does not fit: all sequences the limit, those that
+/// are not there yet the disk.
+void CheckSpace(const SequencesRequest& r, const std::vector<SequenceJob>& jobs) {
+  double all = 0, missing = 0;
   int64_t frames = 0, renderings = 0;
-  for (const synth::SequenceRequest& sequence : sequences) {
-    const auto estimate = synth::Estimate(sequence.recipe, sequence.version, sequence.keep_exr);
-    bytes += static_cast<double>(estimate.bytes);
+  for (const SequenceJob& job : jobs) {
+    const auto estimate =
+        synth::Estimate(job.request.recipe, job.request.version, job.request.keep_exr);
+    all += static_cast<double>(estimate.bytes);
+    if (job.up_to_date) continue;
+    missing += static_cast<double>(estimate.bytes);
     frames += estimate.frames;
     renderings += estimate.renderings;
   }
-  spdlog::info("{} sequences to render: {} stereo frames, {} views to trace, at most {:.2f} GB",
-               sequences.size(), frames, renderings, bytes / kGigabyte);
-  if (bytes > r.Limit())
+  spdlog::info("to render: {} stereo frames, {} views to trace, at most {:.2f} GB", frames,
+               renderings, missing / kGigabyte);
+  if (all > r.Limit())
     throw Error("--limit-gb", fmt::format("the sequences may take {:.2f} GB, the limit is {:.2f}",
-                                          bytes / kGigabyte, r.Limit() / kGigabyte));
+                                          all / kGigabyte, r.Limit() / kGigabyte));
   const auto free = static_cast<double>(std::filesystem::space(r.out).available);
-  if (bytes > free)
+  if (missing > free)
     throw Error(r.out.string(), fmt::format("{:.2f} GB are free, the sequences may take {:.2f} GB",
-                                            free / kGigabyte, bytes / kGigabyte));
+                                            free / kGigabyte, missing / kGigabyte));
 }
 
-std::vector<synth::SequenceRequest> StaleSequences(const SequencesRequest& r,
-                                                   const synth::RenderOptions& options) {
-  std::vector<synth::SequenceRequest> stale;
+/// Reads all recipes before anything is rendered.
+std::vector<SequenceJob> ReadJobs(const SequencesRequest& r, const synth::RenderOptions& options) {
+  std::vector<SequenceJob> jobs;
+  std::set<std::filesystem::path> folders;
   for (const std::string& file : r.recipes) {
-    synth::SequenceRequest sequence;
-    sequence.version = r.Version();
-    sequence.keep_exr = r.keep_exr;
-    ReadOptions(LoadYamlFile(file), sequence.recipe, file);
-    synth::CheckRecipe(sequence.recipe);
-    sequence.folder = r.out / std::filesystem::path(file).stem();
-    const std::string hash =
-        synth::RecipeHash(sequence.recipe, sequence.version, sequence.keep_exr, options);
-    if (IsComplete(sequence.folder, hash))
-      spdlog::info("{} is up to date", sequence.folder.string());
-    else
-      stale.push_back(std::move(sequence));
+    SequenceJob& job = jobs.emplace_back();
+    synth::SequenceRequest& request = job.request;
+    request.version = r.Version();
+    request.keep_exr = r.keep_exr;
+    ReadOptions(LoadYamlFile(file), request.recipe, file);
+    synth::CheckRecipe(request.recipe);
+    request.folder = r.out / std::filesystem::path(file).stem();
+    if (!folders.insert(request.folder).second)
+      throw Error(file, fmt::format("two recipes for {}", request.folder.string()));
+    job.up_to_date = IsComplete(request.folder, synth::RecipeHash(request.recipe, request.version,
+                                                                  request.keep_exr, options));
+    if (job.up_to_date) spdlog::info("{} is up to date", request.folder.string());
   }
-  return stale;
+  return jobs;
 }
 
 void RenderSequences(const SequencesRequest& r) {
   const synth::RenderOptions options = r.quality.Options();
-  std::vector<synth::SequenceRequest> sequences = StaleSequences(r, options);
+  std::vector<SequenceJob> jobs = ReadJobs(r, options);
   std::filesystem::create_directories(r.out);
-  CheckSpace(r, sequences);
+  CheckSpace(r, jobs);
   Renderers renderers(options);
-  for (synth::SequenceRequest& sequence : sequences) {
-    sequence.progress = [&](int frame, int frames) {
-      if (frame % 20 == 0 || frame == frames)
-        spdlog::info("{} {}/{}", sequence.folder.filename().string(), frame, frames);
+  for (SequenceJob& job : jobs) {
+    if (job.up_to_date) continue;
+    const std::string name = job.request.folder.filename().string();
+    job.request.progress = [&](int frame, int frames) {
+      if (frame % 20 == 0 || frame == frames) spdlog::info("{} {}/{}", name, frame, frames);
     };
-    synth::RenderSequence(renderers.Of(sequence.recipe.scene), sequence);
+    synth::RenderSequence(renderers.Of(job.request.recipe.scene), job.request);
   }
 }
 

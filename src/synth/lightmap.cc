@@ -190,8 +190,9 @@ BakedLight::LampShare BakedLight::ShareOf(const AreaLight& lamp, const Vector3f&
       const Vector3f d = q - point;
       const float d2 = d.squaredNorm();
       const float form = std::max(0.0f, d.dot(normal)) * std::max(0.0f, -d.dot(area)) / (d2 * d2);
+      if (!(form > 0)) continue;
       share.all += form;
-      if (form > 0 && !rays_.Blocked(point, q)) share.open += form;
+      if (!rays_.Blocked(point, q)) share.open += form;
     }
   const float scale = std::numbers::inv_pi_v<float> / static_cast<float>(side * side);
   return {share.open * scale, share.all * scale};

@@ -32,8 +32,10 @@ constexpr size_t kStream = 128;
 void SetCoordinates(const Surface& surface, float u, float v, Hit& hit) {
   const unsigned nu = surface.patch ? surface.patch->nu : 1;
   const unsigned nv = surface.patch ? surface.patch->nv : 1;
-  hit.s = (static_cast<float>(hit.quad % nu) + u) / static_cast<float>(nu);
-  hit.t = (static_cast<float>(hit.quad / nu) + v) / static_cast<float>(nv);
+  // On slivers Embree's coordinates may leave [0, 1] or be no numbers.
+  const auto inside = [](float x) { return x > 0 ? std::min(x, 1.0f) : 0.0f; };
+  hit.s = (static_cast<float>(hit.quad % nu) + inside(u)) / static_cast<float>(nu);
+  hit.t = (static_cast<float>(hit.quad / nu) + inside(v)) / static_cast<float>(nv);
 }
 
 RTCRayHit Query(const Ray& ray) {

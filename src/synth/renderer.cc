@@ -103,8 +103,15 @@ cv::Mat3f Frame::Radiance(const std::vector<float>& strengths) const {
     throw Error("light strengths",
                 fmt::format("{} given for {} groups", strengths.size(), light.size()));
   cv::Mat3f sum = cv::Mat3f::zeros(depth.size());
-  for (size_t g = 0; g < light.size(); ++g)
-    cv::scaleAdd(light[g], strengths.empty() ? 1.0 : strengths[g], sum, sum);
+  // Not by OpenCV, which rounds differently where the processor has fused multiply-add.
+  for (size_t g = 0; g < light.size(); ++g) {
+    const float strength = strengths.empty() ? 1.0f : strengths[g];
+    std::transform(light[g].begin(), light[g].end(), sum.begin(), sum.begin(),
+                   [&](const cv::Vec3f& add, const cv::Vec3f& old) {
+                     return cv::Vec3f(old[0] + strength * add[0], old[1] + strength * add[1],
+                                      old[2] + strength * add[2]);
+                   });
+  }
   return sum;
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -61,12 +62,15 @@ void CheckRecipe(const SequenceRecipe& recipe) {
     if (!ok) throw Error(key, fmt::format("is {}; it has to be {}", value, rule));
   };
   const ShortOptions& part = recipe.short_version;
-  require(recipe.duration_s >= 1, "duration_s", recipe.duration_s, "at least 1 s");
+  require(recipe.duration_s >= 1 && recipe.duration_s <= 3600, "duration_s", recipe.duration_s,
+          "1 to 3600 s");
   require(part.frames >= 1 && part.frames <= 200, "short.frames", part.frames, "1 to 200");
   require(part.from_s >= 0, "short.from_s", part.from_s, "0 or more");
   require(
       Frames(recipe, SequenceVersion::kShort).Time(part.frames - 1) <= recipe.duration_s - kLead_s,
       "short.frames", part.frames, "within duration_s");
+  require(recipe.exposure.max_ms <= 1000 / kFrameRate, "exposure.max_ms", recipe.exposure.max_ms,
+          "at most the time between frames, 50 ms");
   require(recipe.blur_samples >= 1 && recipe.blur_samples % 2 == 1, "blur_samples",
           recipe.blur_samples, "odd and positive");
 }
@@ -104,8 +108,12 @@ SequenceEstimate Estimate(const SequenceRecipe& recipe, SequenceVersion version,
   estimate.frames = Frames(recipe, version).count;
   estimate.renderings = int64_t{2} * estimate.frames * recipe.blur_samples;
   const int64_t pixels = int64_t{752} * 480;
-  // Noise does not compress: a byte a pixel. Depth maps hold four.
-  estimate.bytes = pixels * (2 * estimate.frames + 4 * (estimate.frames / kDepthEvery + 1));
+  // Noise does not compress, and PNG adds a little to it. Depth maps hold four bytes a pixel.
+  const int64_t image = pixels * recipe.photometry.bits / 8 * 101 / 100;
+  estimate.bytes = 2 * estimate.frames * image + 4 * pixels * (estimate.frames / kDepthEvery + 1);
+  // Lists, calibration and inertial data: two lines of at most 400 bytes a sample.
+  estimate.bytes +=
+      4'000'000 + static_cast<int64_t>(800 * recipe.imu.rate_hz) * (estimate.frames + 60);
   // All layers: up to six lights of three halves, three layers of three, depth and id.
   if (keep_exr) estimate.bytes += pixels * 2 * estimate.frames * (2 * 3 * (6 + 3) + 4 + 4);
   return estimate;
@@ -144,12 +152,14 @@ class SequenceWriter {
     std::filesystem::create_directories(folder_ / "mav0/depth0/data");
     if (request_.keep_exr)
       for (int eye : {0, 1}) std::filesystem::create_directories(ExrFolder(eye));
+    // First what takes no time and may fail.
+    WriteCalibration();
+    WriteMotion();
     for (int frame = 0; frame < range_.count; ++frame) {
       WriteFrame(frame);
       if (request_.progress) request_.progress(frame + 1, range_.count);
     }
     WriteLists();
-    WriteMotion();
   }
 
  private:
@@ -200,7 +210,7 @@ class SequenceWriter {
     const int64_t stamp = Nanoseconds(time_s);
     std::array<View, 2> views;
     for (int eye : {0, 1}) views[eye] = Look(eye, time_s, exposure_ms / 1000);
-    RequireClearance(views[0], time_s);
+    for (const View& view : views) RequireClearance(view, time_s);
     std::array<cv::Mat, 2> images;
     ParallelFor(2, renderer_.options().threads, [&](int eye) {
       images[eye] = sensors_[eye].Expose(views[eye].luminance, exposure_ms,
@@ -238,13 +248,18 @@ class SequenceWriter {
     depth_times_ns_.push_back(stamp);
   }
 
-  void WriteLists() {
+  void WriteCalibration() const {
     for (int eye : {0, 1}) {
-      WriteEurocImageList(folder_, eye, times_ns_);
       const std::filesystem::path camera = folder_ / fmt::format("mav0/cam{}", eye);
       WritePcalib(camera / "pcalib.txt", sensors_[eye].response().InverseTable(kPcalibLevels));
       WriteVignette(camera / "vignette.png", sensors_[eye].vignette());
-      WriteFrameTimes(camera / "times.txt", exposures_);
+    }
+  }
+
+  void WriteLists() const {
+    for (int eye : {0, 1}) {
+      WriteEurocImageList(folder_, eye, times_ns_);
+      WriteFrameTimes(folder_ / fmt::format("mav0/cam{}/times.txt", eye), exposures_);
     }
     AtomicFile list(folder_ / "mav0/depth0/data.csv");
     list.Write("#timestamp [ns],filename\n");

@@ -26,7 +26,8 @@ std::span<const std::pair<const char*, RigModel>> EnumNames(RigModel);
 /// Camera 0 (left) and 1 (right) of a rig, 752x480 px, 20 Hz.
 std::vector<EurocCamera> RigCameras(RigModel rig);
 
-/// The part of a sequence that its short version has.
+/// The part of a trajectory that a sequence's short version has. It is a sequence of its own: its
+/// auto-exposure and its noise start with its first frame.
 struct ShortOptions {
   double from_s = 0;
   int frames = 150;
@@ -105,7 +106,7 @@ struct SequenceRequest {
 /// resolved recipe. The folder appears whole or not at all and carries a manifest. Time stamps and
 /// ground truth are those of mid-exposure.
 /// @param renderer of the recipe's scene.
-/// @throws Error for a recipe out of range, a camera that comes closer than 0.1 m to a surface, and
+/// @throws Error for a recipe out of range, a camera that sees a surface closer than 0.1 m, and
 ///   files that cannot be written.
 void RenderSequence(const Renderer& renderer, const SequenceRequest& request);
 

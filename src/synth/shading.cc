@@ -76,7 +76,7 @@ void Shader::AddHighlights(const Sight& sight, const Ray& mirrored, const Vector
     const float d2 = d.squaredNorm();
     const Vector3f l = d / std::sqrt(d2);
     const float cosine = l.dot(mirrored.direction);
-    if (cosine < lobe.cosine || l.dot(normal) <= 0) continue;
+    if (!(cosine >= lobe.cosine && l.dot(normal) > 0)) continue;
     const float solid_angle = lamp.area * std::max(0.0f, -l.dot(lamp.normal)) / d2;
     const float filled =
         std::min(1.0f, solid_angle * (m.shininess + 1) / (2 * std::numbers::pi_v<float>));

@@ -40,7 +40,8 @@ struct Samples {
 
   bool InOnePlane() const {
     return std::all_of(hits, hits + count, [&](const Hit& hit) {
-      return hit.surface == hits[0].surface && hit.plane_normal == hits[0].plane_normal;
+      return hit.surface == hits[0].surface && hit.quad == hits[0].quad &&
+             hit.plane_normal == hits[0].plane_normal;
     });
   }
 };

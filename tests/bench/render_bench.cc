@@ -1,5 +1,5 @@
 // Stereo frames a second of the renderer, with all layers, beside the rate at which Embree alone
-// traces the same primary rays of the same scene with the same instruction set.
+// traces primary rays of the same scene with the same instruction set.
 
 #include <map>
 #include <memory>
@@ -57,7 +57,7 @@ void StereoFrame(benchmark::State& state, const std::string& scene) {
   CountFrames(state, 2.0 * 752 * 480 * kSamples);
 }
 
-/// The same primary rays, traced and forgotten.
+/// Four rays a pixel of the left eye, traced and forgotten.
 void PrimaryRays(benchmark::State& state, const std::string& scene_name) {
   const Scene scene = BuildScene(scene_name);
   const internal::RayScene rays(scene);

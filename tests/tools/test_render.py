@@ -72,7 +72,8 @@ def test_photometry_refuses_bad_input(layers, tmp_path):
     command = ("photometry", "--in", layers, "--out", out)
     assert fails(render(*command, "--exposure-ms", -1), "-1")
     assert fails(render(*command, "--light", "moon=1"), "moon", "ceiling")
-    assert fails(render(*command, "--light", "ceiling"), "ceiling")
+    for setting in ("ceiling", "ceiling=-1", "ceiling=nan", "ceiling=0.5x"):
+        assert fails(render(*command, "--light", setting), setting)
     for text, part in (
         ("vignette: {model: polynomial, coefficients: [-1.5]}", "vignette"),
         ("vignette: {model: polynomial, coefficients: [0.5]}", "vignette"),
@@ -106,6 +107,10 @@ def test_pair_is_a_middlebury_scene(tmp_path):
     assert 0.7 < (mask == 255).mean() < 1
     matched = run("sgf_stereo", folder / "im0.png", folder / "im1.png", "-o", tmp_path / "matched")
     assert matched.returncode == 0, matched.stderr
+
+    twice = tmp_path / "twice.yaml"
+    twice.write_text(recipe.read_text() + recipe.read_text().removeprefix("pairs:\n"))
+    assert fails(render("pair", "--recipe", twice, "--preview", "--out", tmp_path / "t"), "two pairs")
 
     stamp = (folder / "im0.png").stat().st_mtime_ns
     assert render("pair", "--recipe", recipe, "--preview", "--out", out).returncode == 0
@@ -146,7 +151,14 @@ def test_a_full_disk_leaves_no_sequence(tmp_path):
     recipe.write_text(RECIPE)
     out = tmp_path / "sequences"
     command = [BUILD / "bin" / "sgf_render", "sequence", recipe, "--preview", "--out", out]
-    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))  # noqa: E731
-    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, timeout=120)
-    assert done.returncode != 0
-    assert not (out / "walk").exists()
+
+    def limit():
+        # Python ignores SIGXFSZ, which the child keeps: writing fails instead of killing it.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    done = subprocess.run(
+        command, capture_output=True, text=True, preexec_fn=limit, restore_signals=False, timeout=120
+    )
+    assert done.returncode == 2, done.stderr
+    assert "walk.partial" in done.stderr and "cannot be written" in done.stderr
+    assert not any(out.iterdir())
