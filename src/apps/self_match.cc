@@ -309,9 +309,7 @@ class FieldPairs {
 fs::path MapsFolder(const Study::Variant& variant, const std::string& maps) {
   if (!variant.is_case() || maps.empty()) return {};
   fs::path folder = fs::path(maps) / variant.change;
-  std::error_code failure;
-  fs::create_directories(folder, failure);
-  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
+  MakeFolder(folder);
   return folder;
 }
 

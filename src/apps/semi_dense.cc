@@ -239,18 +239,6 @@ Study ReadStudy(const SemiDenseRequest& request) {
   return study;
 }
 
-void WriteText(const fs::path& path, const std::string& text) {
-  AtomicFile file(path);
-  file.Write(text);
-  file.Commit();
-}
-
-void MakeFolder(const fs::path& folder) {
-  std::error_code failure;
-  fs::create_directories(folder, failure);
-  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
-}
-
 constexpr const char* kCsvHeader =
     "pair,case,column,candidates,kept,kept_pct,median_m,p90_m,median_pct,p90_pct,bad_pct,"
     "bad_stronger_pct\n";
@@ -273,7 +261,7 @@ class StudyRun {
   }
 
   void WriteTruth() const {
-    WriteText(Out("truth.ply"), ToPly(TrueSemiDense(pair_, calib_, study_.options).points));
+    WriteTextFile(Out("truth.ply"), ToPly(TrueSemiDense(pair_, calib_, study_.options).points));
   }
 
   void RunCase(const std::string& name, const YAML::Node& node) {
@@ -288,8 +276,8 @@ class StudyRun {
   }
 
   void WriteScores() const {
-    WriteText(Out("options.yaml"), YAML::Dump(resolved_) + "\n");
-    WriteText(Out("scores.csv"), table_);
+    WriteTextFile(Out("options.yaml"), YAML::Dump(resolved_) + "\n");
+    WriteTextFile(Out("scores.csv"), table_);
   }
 
  private:
@@ -307,7 +295,7 @@ class StudyRun {
     table_ += fmt::format("{},{},{},", pair.name, run.name, name) + CsvLine(depth.scores);
     resolved_[run.name]["right"] = WriteOptions(run.right);
     resolved_[run.name][name] = WriteOptions(options);
-    if (!column.extra) WriteText(Out(run.name) / (name + ".ply"), ToPly(depth.points));
+    if (!column.extra) WriteTextFile(Out(run.name) / (name + ".ply"), ToPly(depth.points));
   }
 
   SemiDenseRequest request_;

@@ -14,7 +14,7 @@
 
 #include <sgf/apps/cli.h>
 #include <sgf/core/error.h>
-#include <sgf/io/hash.h>
+#include <sgf/io/atomic_file.h>
 #include <sgf/io/image.h>
 #include <sgf/io/manifest.h>
 #include <sgf/synth/frame_exr.h>
@@ -131,7 +131,7 @@ void RenderViews(const ViewsRequest& r) {
   const synth::PixelRays rays(camera, options.samples_per_pixel);
   const Renderer renderer(synth::BuildScene(r.scene), options);
   const std::vector<float> strengths = Strengths(r.lights, renderer.scene().LightGroups());
-  std::filesystem::create_directories(r.out);
+  MakeFolder(r.out);
   int count = 0;
   for (const synth::View& view : renderer.scene().views) {
     if (r.view != "all" && r.view != view.name) continue;
@@ -287,12 +287,18 @@ std::vector<SequenceJob> ReadJobs(const SequencesRequest& r, const synth::Render
 void RenderSequences(const SequencesRequest& r) {
   const synth::RenderOptions options = r.quality.Options();
   std::vector<SequenceJob> jobs = ReadJobs(r, options);
-  std::filesystem::create_directories(r.out);
+  MakeFolder(r.out);
   CheckSpace(r, jobs);
   Renderers renderers(options);
   for (SequenceJob& job : jobs) {
     if (job.up_to_date) continue;
     const std::string name = job.request.folder.filename().string();
+    const synth::SequenceRecipe& recipe = job.request.recipe;
+    const synth::MotionSummary motion = synth::SummarizeMotion(
+        synth::MakeTrajectory(recipe.trajectory, synth::RigCameras(recipe.rig)[0].T_body_cam));
+    spdlog::info("{}: {:.1f} m in {} s, at most {:.2f} m/s, {:.1f} m/s^2 and {:.2f} rad/s", name,
+                 motion.length_m, recipe.duration_s, motion.max_speed, motion.max_acceleration,
+                 motion.max_angular_rate);
     job.request.progress = [&](int frame, int frames) {
       if (frame % 20 == 0 || frame == frames) spdlog::info("{} {}/{}", name, frame, frames);
     };
@@ -328,6 +334,13 @@ void ApplyPhotometry(const PhotometryRequest& r) {
   WritePng(r.out, camera.Expose(luminance, r.exposure_ms, r.seed));
 }
 
+void CheckFolders(const std::vector<std::string>& folders) {
+  for (const std::string& folder : folders) {
+    CheckManifest(folder);
+    spdlog::info("{}: all files are there and as they were written", folder);
+  }
+}
+
 void ListScenes(bool with_views) {
   for (const synth::SceneInfo& scene : synth::AllScenes()) {
     if (!with_views) fmt::print("{:<14} {}\n", scene.name, scene.text);
@@ -356,6 +369,9 @@ int main(int argc, char** argv) {
   CLI::App* pair = app.add_subcommand("pair", "stereo pairs with ground truth");
   CLI::App* sequence = app.add_subcommand("sequence", "stereo-inertial sequences");
   CLI::App* apply = app.add_subcommand("photometry", "a camera's image of layers rendered before");
+  std::vector<std::string> checked;
+  CLI::App* check = app.add_subcommand("check", "compare rendered folders with their manifests");
+  check->add_option("folders", checked, "of pairs or sequences")->required();
   apps::AddViews(*scene, views);
   apps::AddPairs(*pair, pairs);
   apps::AddSequences(*sequence, sequences);
@@ -367,5 +383,6 @@ int main(int argc, char** argv) {
     if (*pair) apps::RenderPairs(pairs);
     if (*sequence) apps::RenderSequences(sequences);
     if (*apply) apps::ApplyPhotometry(photometry);
+    if (*check) apps::CheckFolders(checked);
   });
 }

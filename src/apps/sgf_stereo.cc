@@ -42,12 +42,6 @@ void ListMetrics() {
     fmt::print("{:10} {:6} {:5} {}\n", metric.name, metric.alias, metric.equation, metric.formula);
 }
 
-void WriteText(const fs::path& path, const std::string& text) {
-  AtomicFile file(path);
-  file.Write(text);
-  file.Commit();
-}
-
 // Turbo from the smallest to the largest disparity searched; black where there is none.
 cv::Mat Colour(const cv::Mat1f& disparity, const stereo::BlockMatcherOptions& options) {
   cv::Mat1b levels;
@@ -90,7 +84,7 @@ void WriteRunOptions(const fs::path& folder, const std::string& method, const YA
   node["build"]["revision"] = build.git_revision;
   node["build"]["compiler"] = build.compiler;
   node["build"]["simd"] = ActiveSimdTarget();
-  WriteText(folder / "options.yaml", YAML::Dump(node) + "\n");
+  WriteTextFile(folder / "options.yaml", YAML::Dump(node) + "\n");
 }
 
 // Matches a pair and writes what belongs to it into a folder.
@@ -104,13 +98,11 @@ void MatchPair(const Arguments& arguments, const stereo::BlockMatcherOptions& op
   nlohmann::json scores;
   for (const auto& [region, truth] : truths)
     if (!truth.empty()) scores[region] = ToJson(ScoreDisparity(disparity, truth));
-  std::error_code failure;
-  fs::create_directories(folder, failure);
-  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
+  MakeFolder(folder);
   WriteDisparity(folder, disparity, options);
   WriteRunOptions(folder, arguments.method, method->Options());
   if (scores.empty()) return;
-  WriteText(folder / "scores.json", scores.dump(2) + "\n");
+  WriteTextFile(folder / "scores.json", scores.dump(2) + "\n");
   for (const auto& [region, s] : scores.items())
     fmt::print(
         "{}: {} mean {:.3f} px, bad1 {:.2f} %, bad2 {:.2f} %, bad4 {:.2f} %, invalid {:.2f} %\n",

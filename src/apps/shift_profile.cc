@@ -57,12 +57,6 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-void WriteText(const fs::path& path, const std::string& text) {
-  AtomicFile file(path);
-  file.Write(text);
-  file.Commit();
-}
-
 void WriteGradient(const fs::path& folder, const std::string& row, const SampleField& field) {
   cv::Mat1f ax(field.rows(), field.cols()), ay(field.rows(), field.cols());
   for (int y = 0; y < field.rows(); ++y)
@@ -187,18 +181,16 @@ void RunShiftProfile(const ShiftProfileRequest& request) {
   const ShiftStudy study = ReadShiftStudy(request.experiment);
   const Toy toy = MakeToy(study.toy);
   const fs::path folder = request.output;
-  std::error_code failure;
-  fs::create_directories(folder, failure);
-  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
+  MakeFolder(folder);
   Tables tables;
   WriteRow(study, "noise_free", MakeShiftRow(study, toy, 0), folder, tables);
   WriteRow(study, "noisy", MakeShiftRow(study, toy, study.noise), folder, tables);
   std::string edges = "shift_px,step\n";
   for (size_t k = 0; k < toy.edges.size(); ++k)
     edges += fmt::format("{},{:g}\n", toy.edges[k], study.toy.levels[k + 1] - study.toy.levels[k]);
-  WriteText(folder / "edges.csv", edges);
-  WriteText(folder / "minima.csv", tables.minima);
-  WriteText(folder / "profiles.csv", tables.profiles);
+  WriteTextFile(folder / "edges.csv", edges);
+  WriteTextFile(folder / "minima.csv", tables.minima);
+  WriteTextFile(folder / "profiles.csv", tables.profiles);
 }
 
 }  // namespace sgf::apps

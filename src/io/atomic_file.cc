@@ -67,4 +67,16 @@ void AtomicFile::Fail(const char* what, int error_number) const {
               fmt::format("{}: {}", what, std::generic_category().message(error_number)));
 }
 
+void WriteTextFile(const std::filesystem::path& path, std::string_view text) {
+  AtomicFile file(path);
+  file.Write(text);
+  file.Commit();
+}
+
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw Error(folder.string(), "cannot be made: " + error.message());
+}
+
 }  // namespace sgf

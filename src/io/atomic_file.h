@@ -41,4 +41,11 @@ class AtomicFile {
   bool committed_ = false;
 };
 
+/// Writes a whole file, as AtomicFile does. @throws Error as there.
+void WriteTextFile(const std::filesystem::path& path, std::string_view text);
+
+/// Makes a folder, and those above it, unless it is there.
+/// @throws Error naming it when that fails.
+void MakeFolder(const std::filesystem::path& folder);
+
 }  // namespace sgf

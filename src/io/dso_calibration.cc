@@ -21,12 +21,6 @@ namespace {
 constexpr int64_t kSecond = 1'000'000'000;
 constexpr double kWhite = 65535;
 
-void WriteText(const std::filesystem::path& path, const std::string& text) {
-  AtomicFile file(path);
-  file.Write(text);
-  file.Commit();
-}
-
 std::string AtLine(const std::filesystem::path& path, size_t line) {
   return fmt::format("{}:{}", path.string(), line);
 }
@@ -97,7 +91,7 @@ void WritePcalib(const std::filesystem::path& path, const std::vector<double>& i
   std::string line;
   for (const double value : inverse_response)
     line += fmt::format("{}{}", line.empty() ? "" : " ", value * (kPcalibLevels - 1));
-  WriteText(path, line + "\n");
+  WriteTextFile(path, line + "\n");
 }
 
 std::vector<double> ReadPcalib(const std::filesystem::path& path) {
@@ -156,7 +150,7 @@ void WriteFrameTimes(const std::filesystem::path& path, const std::vector<FrameT
     text += fmt::format("{} {}.{:09} {}\n", frame.id, frame.time_ns / kSecond,
                         frame.time_ns % kSecond, frame.exposure_ms);
   }
-  WriteText(path, text);
+  WriteTextFile(path, text);
 }
 
 std::vector<FrameTime> ReadFrameTimes(const std::filesystem::path& path) {

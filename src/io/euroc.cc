@@ -300,18 +300,6 @@ void ReadTruthFolder(const fs::path& folder, EurocSequence& sequence) {
 
 fs::path Mav0(const fs::path& folder) { return folder / "mav0"; }
 
-void MakeFolder(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw Error(folder.string(), "cannot be created: " + error.message());
-}
-
-void WriteText(const fs::path& path, std::string_view text) {
-  AtomicFile file(path);
-  file.Write(text);
-  file.Commit();
-}
-
 // With a decimal point in every number: YAML 1.1 takes "1e-05" for a string.
 template <class Range>
 std::string YamlList(const Range& values) {
@@ -377,13 +365,13 @@ void WriteEurocSensors(const fs::path& folder, const EurocSensors& sensors) {
   const fs::path root = Mav0(folder);
   for (int i = 0; i < static_cast<int>(sensors.cameras.size()); ++i) {
     MakeFolder(root / CameraFolder(i) / "data");
-    WriteText(root / CameraFolder(i) / "sensor.yaml", CameraYaml(sensors.cameras[i], i));
+    WriteTextFile(root / CameraFolder(i) / "sensor.yaml", CameraYaml(sensors.cameras[i], i));
   }
   MakeFolder(root / "imu0");
-  WriteText(root / "imu0" / "sensor.yaml", ImuYaml(sensors));
+  WriteTextFile(root / "imu0" / "sensor.yaml", ImuYaml(sensors));
   MakeFolder(root / kTruthFolder);
-  WriteText(root / kTruthFolder / "sensor.yaml", TruthYaml());
-  WriteText(root / "body.yaml", "comment: simulated body\n");
+  WriteTextFile(root / kTruthFolder / "sensor.yaml", TruthYaml());
+  WriteTextFile(root / "body.yaml", "comment: simulated body\n");
 }
 
 fs::path EurocImagePath(const fs::path& folder, int camera, std::int64_t time_ns) {
@@ -395,7 +383,7 @@ void WriteEurocImageList(const fs::path& folder, int camera,
   std::string text = fmt::format("{}\n", kImageHeader);
   for (const std::int64_t time : times_ns)
     fmt::format_to(std::back_inserter(text), "{0},{0}.png\n", time);
-  WriteText(Mav0(folder) / CameraFolder(camera) / "data.csv", text);
+  WriteTextFile(Mav0(folder) / CameraFolder(camera) / "data.csv", text);
 }
 
 void WriteEurocImu(const fs::path& folder, std::span<const ImuSample> samples) {
@@ -403,7 +391,7 @@ void WriteEurocImu(const fs::path& folder, std::span<const ImuSample> samples) {
   for (const ImuSample& s : samples)
     fmt::format_to(std::back_inserter(text), "{},{},{}\n", s.time_ns, fmt::join(s.gyro, ","),
                    fmt::join(s.accel, ","));
-  WriteText(Mav0(folder) / "imu0" / "data.csv", text);
+  WriteTextFile(Mav0(folder) / "imu0" / "data.csv", text);
 }
 
 void WriteEurocTruth(const fs::path& folder, std::span<const BodyState> states) {
@@ -415,7 +403,7 @@ void WriteEurocTruth(const fs::path& folder, std::span<const BodyState> states) 
                    fmt::join(s.velocity, ","), fmt::join(s.gyro_bias, ","),
                    fmt::join(s.accel_bias, ","));
   }
-  WriteText(Mav0(folder) / kTruthFolder / "data.csv", text);
+  WriteTextFile(Mav0(folder) / kTruthFolder / "data.csv", text);
 }
 
 }  // namespace sgf

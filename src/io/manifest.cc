@@ -153,12 +153,6 @@ fs::path Normal(const fs::path& path) {
   return normal.has_filename() ? normal : normal.parent_path();
 }
 
-void MakeFolder(const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) throw Error(path.string(), "cannot be created: " + error.message());
-}
-
 void RemoveContent(const fs::path& folder) try {
   for (const auto& entry : fs::directory_iterator(folder)) RemoveAll(entry.path());
 } catch (const fs::filesystem_error& error) {

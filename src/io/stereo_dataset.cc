@@ -266,9 +266,7 @@ void WriteMiddleburyScene(const fs::path& folder, const StereoPair& pair,
         {"truth_noc", &pair.truth_noc}})
     RequireCalibSize(folder, what, *image, calib);
   const std::string calib_text = CalibText(folder, pair.truth_all, calib);
-  std::error_code failure;
-  fs::create_directories(folder, failure);
-  if (failure) throw Error(folder.string(), "cannot be made: " + failure.message());
+  MakeFolder(folder);
   WritePng(folder / "im0.png", pair.left);
   WritePng(folder / "im1.png", pair.right);
   WriteDisparityPfm(folder / "disp0GT.pfm", pair.truth_all);

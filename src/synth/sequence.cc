@@ -149,9 +149,9 @@ class SequenceWriter {
 
   void Write() {
     WriteEurocSensors(folder_, {cameras_, recipe_.imu.rate_hz, recipe_.imu.noise});
-    std::filesystem::create_directories(folder_ / "mav0/depth0/data");
+    MakeFolder(folder_ / "mav0/depth0/data");
     if (request_.keep_exr)
-      for (int eye : {0, 1}) std::filesystem::create_directories(ExrFolder(eye));
+      for (int eye : {0, 1}) MakeFolder(ExrFolder(eye));
     // First what takes no time and may fail.
     WriteCalibration();
     WriteMotion();
@@ -261,10 +261,9 @@ class SequenceWriter {
       WriteEurocImageList(folder_, eye, times_ns_);
       WriteFrameTimes(folder_ / fmt::format("mav0/cam{}/times.txt", eye), exposures_);
     }
-    AtomicFile list(folder_ / "mav0/depth0/data.csv");
-    list.Write("#timestamp [ns],filename\n");
-    for (int64_t stamp : depth_times_ns_) list.Write(fmt::format("{0},{0}.exr\n", stamp));
-    list.Commit();
+    std::string list = "#timestamp [ns],filename\n";
+    for (int64_t stamp : depth_times_ns_) list += fmt::format("{0},{0}.exr\n", stamp);
+    WriteTextFile(folder_ / "mav0/depth0/data.csv", list);
   }
 
   void WriteMotion() const {
@@ -299,9 +298,7 @@ void RenderSequence(const Renderer& renderer, const SequenceRequest& request) {
   CheckRecipe(request.recipe);
   StagedFolder staged(request.folder);
   SequenceWriter(renderer, request, staged.path()).Write();
-  AtomicFile recipe(staged.path() / "recipe.yaml");
-  recipe.Write(YAML::Dump(WriteOptions(request.recipe)) + "\n");
-  recipe.Commit();
+  WriteTextFile(staged.path() / "recipe.yaml", YAML::Dump(WriteOptions(request.recipe)) + "\n");
   staged.Commit(RecipeHash(request.recipe, request.version, request.keep_exr, renderer.options()),
                 {{"frames", Frames(request.recipe, request.version).count}});
 }

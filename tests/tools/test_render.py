@@ -140,6 +140,9 @@ def test_sequence_is_rendered_once_and_refused_where_it_does_not_fit(tmp_path):
     assert len(images) == 2  # one a second
     again = render(*command)
     assert "up to date" in again.stdout + again.stderr
+    assert render("check", out / "walk").returncode == 0
+    images[0].write_bytes(images[1].read_bytes())
+    assert fails(render("check", out / "walk"), images[0].name)
     recipe.write_text(RECIPE + "trajektory: {}\n")
     assert fails(render(*command), "walk.yaml:", "trajektory")
     recipe.write_text(RECIPE.replace("mocap_room_1", "attic"))

@@ -363,7 +363,7 @@ TEST_F(Euroc, ReportsMissingFiles) {
 
 TEST_F(Euroc, ReportsAFolderThatCannotBeMade) {
   const fs::path file = dir_.Write("file", "");
-  EXPECT_THAT(ErrorMessage([&] { WriteEurocSensors(file, {}); }), HasSubstr("cannot be created"));
+  EXPECT_THAT(ErrorMessage([&] { WriteEurocSensors(file, {}); }), HasSubstr("cannot be made"));
 }
 
 // Whatever stands in a file, reading gives a sequence or an Error.

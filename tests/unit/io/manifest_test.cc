@@ -230,7 +230,7 @@ TEST(StagedFolder, NamesAFolderThatCannotBeMade) {
   const TempDir dir;
   const fs::path target = dir.Write("file", "") / "room";
   EXPECT_THAT(ErrorMessage([&] { StagedFolder staged(target); }),
-              HasSubstr("room.partial: cannot be created"));
+              HasSubstr("room.partial: cannot be made"));
 }
 
 // Runs in a process of its own, so that it can end at any place.
