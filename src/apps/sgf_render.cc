@@ -9,7 +9,6 @@
 #include <set>
 
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 #include <spdlog/spdlog.h>
 
 #include <sgf/apps/cli.h>
@@ -67,15 +66,6 @@ class Renderers {
   synth::RenderOptions options_;
   std::map<std::string, std::unique_ptr<Renderer>> renderers_;
 };
-
-/// Linear RGB for the screen: 8-bit BGR, gamma 2.2, radiance 1 is white.
-cv::Mat3b ForScreen(const cv::Mat3f& radiance) {
-  cv::Mat clipped = cv::min(radiance, cv::Scalar::all(1)), curved, bgr;
-  cv::pow(clipped, 1 / 2.2, curved);
-  curved.convertTo(bgr, CV_8U, 255);
-  cv::cvtColor(bgr, bgr, cv::COLOR_RGB2BGR);
-  return bgr;
-}
 
 /// Strengths of light groups by name, from "lamp=0.5".
 std::vector<float> Strengths(const std::vector<std::string>& settings,
@@ -138,7 +128,7 @@ void RenderViews(const ViewsRequest& r) {
     const SE3 T_world_cam = synth::LookAt(view.eye.cast<double>(), view.target.cast<double>());
     const synth::Frame frame = renderer.Render(rays, T_world_cam);
     const std::string name = r.scene + "_" + view.name;
-    WritePng(r.out / (name + ".png"), ForScreen(frame.Radiance(strengths)));
+    WritePng(r.out / (name + ".png"), synth::ForScreen(frame.Radiance(strengths)));
     if (r.exr) {
       ExrImage layers = synth::ToExr(frame, camera, T_world_cam);
       layers.attributes = {{"scene", r.scene}, {"view", view.name}};
@@ -190,7 +180,7 @@ void RenderPairs(const PairsRequest& r) {
     StagedFolder staged(folder);
     WriteMiddleburyScene(staged.path(), synth::Expose(rendered, pair, options.threads),
                          rendered.calib);
-    WritePng(staged.path() / "view.png", ForScreen(rendered.left.Radiance()));
+    WritePng(staged.path() / "view.png", synth::ForScreen(rendered.left.Radiance()));
     if (r.exr) {
       WriteExr(staged.path() / "left.exr",
                synth::ToExr(rendered.left, rendered.camera, rendered.T_world_left));

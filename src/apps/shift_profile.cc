@@ -42,6 +42,12 @@ void CheckToy(const ToyOptions& o) {
     throw Error("blur", fmt::format("must be in [0, 100], got {}", o.blur));
 }
 
+void CheckProfile(const ProfileOptions& o) {
+  RequireAtLeast("minimum_distance", 1, o.minimum_distance);
+  if (!(o.minimum_share > 0 && o.minimum_share <= 1))
+    throw Error("minimum_share", fmt::format("must be in (0, 1], got {}", o.minimum_share));
+}
+
 // Grey level before the blur.
 double ToyLevel(const ToyOptions& o, int x, int y) {
   const int strip = o.small_rows * o.small_box;
@@ -179,6 +185,7 @@ ShiftRow MakeShiftRow(const ShiftStudy& study, const Toy& toy, double noise) {
 
 void RunShiftProfile(const ShiftProfileRequest& request) {
   const ShiftStudy study = ReadShiftStudy(request.experiment);
+  CheckProfile(study.profile);
   const Toy toy = MakeToy(study.toy);
   const fs::path folder = request.output;
   MakeFolder(folder);

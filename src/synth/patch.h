@@ -30,6 +30,9 @@ Patch MakePatch(int nu, int nv, F&& f);
 /// normals.
 Patch PatchFromPoints(int nu, int nv, std::vector<Eigen::Vector3f> points);
 
+/// Sets length_s_m and length_t_m from the points.
+void ComputeLengths(Patch& patch);
+
 /// The patches moved (and scaled) by an affine map.
 /// @throws Error for a map that mirrors or flattens.
 Patches Transformed(Patches patches, const Eigen::Affine3f& T);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include <fmt/core.h>
+#include <opencv2/imgproc.hpp>
 
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
@@ -287,6 +288,14 @@ cv::Mat1f Luminance(const cv::Mat3f& rgb) {
       out[x] = 0.2126F * in[x][0] + 0.7152F * in[x][1] + 0.0722F * in[x][2];
   }
   return luminance;
+}
+
+cv::Mat3b ForScreen(const cv::Mat3f& radiance) {
+  cv::Mat clipped = cv::min(radiance, cv::Scalar::all(1)), curved, bgr;
+  cv::pow(clipped, 1 / 2.2, curved);
+  curved.convertTo(bgr, CV_8U, 255);
+  cv::cvtColor(bgr, bgr, cv::COLOR_RGB2BGR);
+  return bgr;
 }
 
 uint64_t FrameSeed(uint64_t seed, int camera, int frame) {

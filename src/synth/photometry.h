@@ -131,6 +131,9 @@ class Quantizer {
 /// Luminance of linear RGB (in this order) by the weights of ITU-R BT.709.
 cv::Mat1f Luminance(const cv::Mat3f& rgb);
 
+/// Linear RGB for people to look at: 8-bit BGR, gamma 2.2, radiance 1 is white.
+cv::Mat3b ForScreen(const cv::Mat3f& radiance);
+
 /// Seed of one frame's noise, another one for every camera and frame of a sequence.
 uint64_t FrameSeed(uint64_t seed, int camera, int frame);
 

@@ -31,7 +31,7 @@ class Project:
 
     def __init__(self, root):
         self.root = root / "a project"  # a blank, which paths must survive
-        self.log = root / "stub.log"
+        self.log = root / "calls.log"
         self.results = self.root / "results"
         self.bin = self.root / "build" / "release" / "bin"
         self.data = root / "my data"

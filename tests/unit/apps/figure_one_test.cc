@@ -12,6 +12,7 @@
 
 #include <sgf/apps/self_match.h>
 #include <sgf/io/image.h>
+#include <sgf/synth/photometry.h>
 #include <sgf/synth/renderer.h>
 
 #include "support/temp_dir.h"
@@ -48,18 +49,10 @@ class FigureOne : public ::testing::Test {
     for (int k = 0; k < 2; ++k) {
       const synth::View& view = renderer.scene().views.at(k);
       const SE3 pose = synth::LookAt(view.eye.cast<double>(), view.target.cast<double>());
-      scores_.push_back(Match(ForScreen(renderer.Render(rays, pose).Radiance())));
+      scores_.push_back(Match(synth::ForScreen(renderer.Render(rays, pose).Radiance())));
     }
   }
   static void TearDownTestSuite() { scores_.clear(); }
-
-  static cv::Mat3b ForScreen(const cv::Mat3f& radiance) {
-    cv::Mat clipped = cv::min(radiance, cv::Scalar::all(1)), curved, bgr;
-    cv::pow(clipped, 1 / 2.2, curved);
-    curved.convertTo(bgr, CV_8U, 255);
-    cv::cvtColor(bgr, bgr, cv::COLOR_RGB2BGR);
-    return bgr;
-  }
 
   // Scores by case.
   static std::map<std::string, Scores> Match(const cv::Mat3b& image) {

@@ -182,6 +182,10 @@ TEST(RunShiftProfile, NamesWhatIsWrongInItsFile) {
             "patch: 11 x 95 px do not fit into the image around (120, 48)");
   EXPECT_EQ(message("study: {profile: {metrics: [lssd]}}"),
             "metric: 'lssd' is no sum over the pixel pairs of a window");
+  EXPECT_EQ(message("study: {profile: {minimum_distance: -1}}"),
+            "minimum_distance: must be at least 1, got -1");
+  EXPECT_EQ(message("study: {profile: {minimum_share: 0}}"),
+            "minimum_share: must be in (0, 1], got 0");
   EXPECT_EQ(message("study: {noise: -1}"), "noise: must be finite and not negative, got -1");
 }
 
