@@ -24,6 +24,49 @@ HWY_BEFORE_NAMESPACE();
 namespace sgf::stereo::internal {
 namespace HWY_NAMESPACE {
 
+// The costs that SgfSource makes, as rows.
+class SgfCostRows final : public CostRows {
+ public:
+  SgfCostRows(int width, const CostOptions& options, std::shared_ptr<const SgfImage> left,
+              std::shared_ptr<const SgfImage> right)
+      : left_(std::move(left)),
+        right_(std::move(right)),
+        width_(width),
+        count_(options.num_disparities),
+        source_(TaskOf(width, options), *left_, *right_,
+                static_cast<int>(hwy::RoundUpTo(count_, hn::Lanes(D16())))) {}
+
+  void Row(int y, int stride, uint16_t* costs) override {
+    const D16 d;
+    const hn::RebindToUnsigned<D16> du;
+    const int lanes = static_cast<int>(hn::Lanes(d)), whole = count_ / lanes * lanes;
+    HWY_ALIGN uint16_t last[HWY_MAX_BYTES / sizeof(uint16_t)];
+    source_.StartRow(y);
+    for (int x = 0; x < width_; ++x, costs += stride) {
+      const auto column = source_.At(x);
+      for (int k = 0; k < whole; k += lanes)
+        hn::StoreU(hn::BitCast(du, column(d, k)), du, costs + k);
+      if (whole == count_) continue;
+      hn::Store(hn::BitCast(du, column(d, whole)), du, last);
+      std::copy_n(last, count_ - whole, costs + whole);
+    }
+  }
+
+ private:
+  static BandTask TaskOf(int width, const CostOptions& options) {
+    BandTask task{};
+    task.width = width;
+    task.min_disparity = options.min_disparity;
+    task.num_disparities = options.num_disparities;
+    task.window = 1;
+    return task;
+  }
+
+  std::shared_ptr<const SgfImage> left_, right_;
+  int width_, count_;
+  SgfSource source_;
+};
+
 // Source of costs for BandMatcher: rows that are made elsewhere.
 class RowSource {
  public:
@@ -302,6 +345,12 @@ void SgfBand(const BandTask& task, const SgfImage& left, const SgfImage& right) 
   BandMatcher<SgfSource>(task, stride, source).Run();
 }
 
+std::unique_ptr<CostRows> SgfRows(int width, const CostOptions& options,
+                                  std::shared_ptr<const SgfImage> left,
+                                  std::shared_ptr<const SgfImage> right) {
+  return std::make_unique<SgfCostRows>(width, options, std::move(left), std::move(right));
+}
+
 void CostBand(const BandTask& task, CostRows& costs) {
   const int stride = Stride<RowSource::Sum>(task);
   RowSource source(task, costs, stride);
@@ -317,6 +366,7 @@ namespace sgf::stereo::internal {
 
 HWY_EXPORT(SumSquaredGradient);
 HWY_EXPORT(SgfBand);
+HWY_EXPORT(SgfRows);
 HWY_EXPORT(CostBand);
 
 int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begin, int end) {
@@ -325,6 +375,12 @@ int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begi
 
 void MatchSgfBand(const BandTask& task, const SgfImage& left, const SgfImage& right) {
   HWY_DYNAMIC_DISPATCH(SgfBand)(task, left, right);
+}
+
+std::unique_ptr<CostRows> MakeSgfCostRows(int width, const CostOptions& options,
+                                          std::shared_ptr<const SgfImage> left,
+                                          std::shared_ptr<const SgfImage> right) {
+  return HWY_DYNAMIC_DISPATCH(SgfRows)(width, options, std::move(left), std::move(right));
 }
 
 void MatchCostBand(const BandTask& task, CostRows& costs) {

@@ -4,12 +4,14 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
 #include <sgf/core/gradient.h>
 #include <sgf/stereo/block_matcher.h>
+#include <sgf/stereo/sgf_image.h>
 
 namespace sgf::stereo::internal {
 
@@ -27,8 +29,8 @@ struct BandTask {
   cv::Mat1i* second;     ///< output or null
 };
 
-/// Costs of one image row against all disparities, for dissimilarities other than fixed-point sgf.
-/// One object serves one band and is asked for rows in increasing order.
+/// Costs of one image row against all disparities. One object serves one band and is asked for rows
+/// in increasing order.
 class CostRows {
  public:
   virtual ~CostRows() = default;
@@ -40,16 +42,6 @@ class CostRows {
 /// Stands in Matches::second where a pixel has no such candidate.
 constexpr int kNoSecond = std::numeric_limits<int>::max();
 
-/// An image prepared for fixed-point sgf: its 8-bit pixels or, for other inputs, its gradient; and
-/// epsilon as one number or a map.
-struct SgfImage {
-  cv::Mat1b pixels;        ///< of 8-bit images; empty for others
-  GradientOperator op;     ///< taken of the pixels
-  GradientImage gradient;  ///< used where `pixels` is empty
-  cv::Mat1f epsilon;       ///< 1 x 1, or one value a pixel, (grey levels/px)^2
-  float tau;
-};
-
 /// Cost of a dissimilarity of 1: at most 63, and as large as lets a window's sum of costs fit 16
 /// bits (63 up to 21 px, 11 at 51 px). tau is effectively at least this over 32767.
 int SgfCostScale(int window);
@@ -60,6 +52,11 @@ int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begi
 
 /// Matches a band on sgf in 16-bit fixed point (sgf.inc on int16 lanes).
 void MatchSgfBand(const BandTask& task, const SgfImage& left, const SgfImage& right);
+
+/// The same fixed-point costs pixel by pixel, SgfCostScale(1) for a dissimilarity of 1.
+std::unique_ptr<CostRows> MakeSgfCostRows(int width, const CostOptions& options,
+                                          std::shared_ptr<const SgfImage> left,
+                                          std::shared_ptr<const SgfImage> right);
 
 /// Matches a band on any other cost.
 void MatchCostBand(const BandTask& task, CostRows& costs);

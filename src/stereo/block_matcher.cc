@@ -10,11 +10,11 @@
 
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
-#include <sgf/metrics/registry.h>
 #include <sgf/stereo/band.h>
 #include <sgf/stereo/block_matcher.h>
 #include <sgf/stereo/cost_rows.h>
 #include <sgf/stereo/prefilter.h>
+#include <sgf/stereo/sgf_image.h>
 
 namespace sgf::stereo {
 namespace {
@@ -22,107 +22,32 @@ namespace {
 using internal::BandTask;
 using internal::SgfImage;
 
-constexpr int kLargestUniqueness = 99;   // percent; less than the winner itself
-constexpr int kLargestDisparity = 2047;  // 16 times it fits 16 bits
-constexpr int kLargestWindow = 51;       // at which 16 bits still hold sums of costs of 20 levels
-
-void RequireRange(const char* option, double value, double low, double high) {
-  if (!(value >= low && value <= high))
-    throw Error(option, fmt::format("must be in [{}, {}], got {}", low, high, value));
-}
-
-void RequireOdd(const char* option, int value) {
-  if (value % 2 == 0) throw Error(option, fmt::format("must be odd, got {}", value));
-}
+constexpr int kLargestUniqueness = 99;  // percent; less than the winner itself
+constexpr int kLargestWindow = 51;      // at which 16 bits still hold sums of costs of 20 levels
 
 }  // namespace
 
 void CheckOptions(const BlockMatcherOptions& o) {
-  if (metrics::FindMetric(o.metric).traits.kind == metrics::MetricKind::kPatch)
-    throw Error("metric",
-                fmt::format("'{}' compares patches and cannot be a stereo cost", o.metric));
-  RequireRange("min_disparity", o.min_disparity, -kLargestDisparity, kLargestDisparity);
-  RequireRange("num_disparities", o.num_disparities, 1, kLargestDisparity - o.min_disparity + 1);
+  CheckCostOptions(o);
   RequireRange("window", o.window, 1, kLargestWindow);
   RequireOdd("window", o.window);
-  RequireRange("prefilter_window", o.prefilter_window, 3, 255);
-  RequireOdd("prefilter_window", o.prefilter_window);
-  RequireRange("prefilter_cap", o.prefilter_cap, 1, 63);
-  RequireRange("epsilon.tile_px", o.epsilon.tile_px, 1, 1e6);
-  RequireRange("epsilon.window_px", o.epsilon.window_px, 1, 1e6);
-  RequireOdd("epsilon.window_px", o.epsilon.window_px);
-  RequireRange("epsilon.noise_floor", o.epsilon.noise_floor, 0, 1e9);
-  RequireRange("pm.alpha", o.pm.alpha, 0, 1);
-  RequireRange("pm.tau_c", o.pm.tau_c, 0, std::numeric_limits<double>::infinity());
-  RequireRange("pm.tau_g", o.pm.tau_g, 0, std::numeric_limits<double>::infinity());
-  RequireRange("tau", o.tau, 1e-30, 1);
   RequireRange("uniqueness_pct", o.uniqueness_pct, 0, kLargestUniqueness);
   RequireRange("texture_threshold", o.texture_threshold, 0, 1e6);
   RequireRange("left_right_max", o.left_right_max, -1, kLargestDisparity);
   RequireRange("speckle_window", o.speckle_window, 0, 1e9);
   RequireRange("speckle_range", o.speckle_range, 0, kLargestDisparity);
-  RequireRange("threads", o.threads, 0, 4096);
 }
 
 void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {
-  RequireGreyImage(left, "left image");
-  RequireGreyImage(right, "right image");
-  if (left.size() != right.size() || left.type() != right.type())
-    throw Error("right image", fmt::format("is {}x{} {}, the left image {}x{} {}", right.cols,
-                                           right.rows, cv::typeToString(right.type()), left.cols,
-                                           left.rows, cv::typeToString(left.type())));
+  CheckPair(left, right, static_cast<const CostOptions&>(options));
   if (options.window > std::min(left.cols, left.rows))
     throw Error("window",
                 fmt::format("{} exceeds the image of {}x{}", options.window, left.cols, left.rows));
-  if (options.num_disparities > left.cols)
-    throw Error("num_disparities", fmt::format("{} exceeds the image's width of {}",
-                                               options.num_disparities, left.cols));
 }
 
 namespace {
 
 int UniquenessQ16(double percent) { return static_cast<int>(std::lround(percent / 100 * 65536)); }
-
-// Eq. 6 of an 8-bit image without a gradient image: exact, so the same number as
-// MeanSquaredGradient.
-double MeanSquaredGradient(const cv::Mat1b& image, const BlockMatcherOptions& options) {
-  constexpr int kParts = 8;
-  std::array<int64_t, kParts> sums{};
-  ParallelFor(kParts, options.threads, [&](int i) {
-    sums[i] = internal::SumSquaredGradient(image, options.gradient, image.rows * i / kParts,
-                                           image.rows * (i + 1) / kParts);
-  });
-  constexpr double kUnitsPerSquaredLevel = 32.0 * 32.0;
-  const int64_t total = std::accumulate(sums.begin(), sums.end(), int64_t{0});
-  return static_cast<double>(total) / kUnitsPerSquaredLevel / static_cast<double>(image.total());
-}
-
-bool UsesPixels(const cv::Mat& image, const BlockMatcherOptions& options) {
-  return image.type() == CV_8UC1 && options.epsilon.scope == metrics::EpsilonScope::kImage;
-}
-
-SgfImage FromPixels(const cv::Mat& image, const BlockMatcherOptions& options) {
-  const double epsilon = MeanSquaredGradient(image, options) + options.epsilon.noise_floor;
-  return {image,
-          options.gradient,
-          {},
-          cv::Mat1f(1, 1, static_cast<float>(epsilon)),
-          static_cast<float>(options.tau)};
-}
-
-SgfImage FromGradient(const cv::Mat& image, const BlockMatcherOptions& options) {
-  SgfImage prepared{{},
-                    options.gradient,
-                    ComputeGradient(image, options.gradient),
-                    {},
-                    static_cast<float>(options.tau)};
-  prepared.epsilon = metrics::ComputeEpsilon(prepared.gradient, options.epsilon);
-  return prepared;
-}
-
-SgfImage PrepareSgf(const cv::Mat& image, const BlockMatcherOptions& options) {
-  return UsesPixels(image, options) ? FromPixels(image, options) : FromGradient(image, options);
-}
 
 // Runs `match_band` on bands of rows. Sums are exact, so the split does not show in the result.
 template <class MatchBand>
@@ -140,13 +65,13 @@ void ForEachBand(const BandTask& whole, int threads, const MatchBand& match_band
 void RunBands(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options,
               BandTask task) {
   if (options.metric == "sgf") {
-    const SgfImage l = PrepareSgf(left, options);
-    const SgfImage r = PrepareSgf(right, options);
+    const SgfImage l = internal::PrepareSgf(left, options);
+    const SgfImage r = internal::PrepareSgf(right, options);
     ForEachBand(task, options.threads,
                 [&](const BandTask& band) { internal::MatchSgfBand(band, l, r); });
     return;
   }
-  const auto factory = internal::PrepareCostRows(left, right, options);
+  const auto factory = internal::PrepareCostRows(left, right, options, options.window);
   task.window = factory.window;
   ForEachBand(task, options.threads, [&](const BandTask& band) {
     const auto rows = factory.make();
@@ -165,14 +90,6 @@ cv::Mat1f Texture(const cv::Mat& image, const BlockMatcherOptions& options) {
 }
 
 }  // namespace
-
-std::span<const std::pair<const char*, Prefilter>> EnumNames(Prefilter) {
-  static constexpr std::array<std::pair<const char*, Prefilter>, 3> kNames{
-      {{"none", Prefilter::kNone},
-       {"normalized_response", Prefilter::kNormalizedResponse},
-       {"xsobel", Prefilter::kXSobel}}};
-  return kNames;
-}
 
 std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel) {
   static constexpr std::array<std::pair<const char*, Subpixel>, 3> kNames{

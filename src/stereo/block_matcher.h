@@ -1,25 +1,13 @@
 #pragma once
 
 #include <span>
-#include <string>
 #include <utility>
 
 #include <opencv2/core.hpp>
 
-#include <sgf/core/gradient.h>
-#include <sgf/metrics/epsilon.h>
-#include <sgf/metrics/point_metrics.h>
-#include <sgf/metrics/sample.h>
+#include <sgf/stereo/cost_options.h>
 
 namespace sgf::stereo {
-
-/// What happens to both images before a cost is taken.
-enum class Prefilter {
-  kNone,
-  kNormalizedResponse,  ///< OpenCV's PREFILTER_NORMALIZED_RESPONSE: contrast against a local mean
-  kXSobel,              ///< OpenCV's PREFILTER_XSOBEL: horizontal Sobel response, clipped
-};
-std::span<const std::pair<const char*, Prefilter>> EnumNames(Prefilter);
 
 /// Curve through the winner's cost and its two neighbours whose minimum is the sub-pixel disparity.
 enum class Subpixel {
@@ -29,55 +17,20 @@ enum class Subpixel {
 };
 std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel);
 
-/// Parameters of the dissimilarity pm (eq. 4), for which the paper gives no values.
-struct PmOptions {
-  double alpha = metrics::Pm{}.alpha;
-  double tau_c = metrics::Pm{}.tau_c;
-  double tau_g = metrics::Pm{}.tau_g;
-
-  template <class V>
-  void VisitFields(V&& visit) {
-    visit("alpha", alpha, "", "weight of the gradient part");
-    visit("tau_c", tau_c, "grey levels", "limit of the photometric part; .inf for none");
-    visit("tau_g", tau_g, "grey levels/px", "limit of the gradient part; .inf for none");
-  }
-};
-
 /// Parameters of BlockMatcher. Where a default has a counterpart in cv::StereoBM, it is named.
-struct BlockMatcherOptions {
-  std::string metric = "sgf";
-  int min_disparity = 0;
-  int num_disparities = 64;
+struct BlockMatcherOptions : CostOptions {
   int window = 9;
-  Prefilter prefilter = Prefilter::kNone;
-  int prefilter_window = 9;
-  int prefilter_cap = 31;
-  GradientOperator gradient = GradientOperator::kScharr;
-  metrics::EpsilonOptions epsilon;
-  double tau = metrics::kTau;
-  PmOptions pm;
   Subpixel subpixel = Subpixel::kEquiangular;
   double uniqueness_pct = 10;
   double texture_threshold = 0;
   int left_right_max = 1;
   int speckle_window = 0;
   double speckle_range = 1;
-  int threads = 1;
 
   template <class V>
   void VisitFields(V&& visit) {
-    visit("metric", metric, "", "dissimilarity, one of the name table");
-    visit("min_disparity", min_disparity, "px", "smallest disparity searched");
-    visit("num_disparities", num_disparities, "px", "number of integer disparities searched");
+    CostOptions::VisitFields(visit);
     visit("window", window, "px", "side of the square matching window, odd");
-    visit("prefilter", prefilter, "", "image transform before matching");
-    visit("prefilter_window", prefilter_window, "px", "side of normalized_response's window, odd");
-    visit("prefilter_cap", prefilter_cap, "grey levels", "prefilter response is clipped to +-cap");
-    visit("gradient", gradient, "", "derivative operator");
-    visit("epsilon", epsilon, "", "normalisation of gradients, eq. 6");
-    visit("tau", tau, "",
-          "lower bound of the denominator of sgf, eq. 10 (metric sgf: at least 0.002)");
-    visit("pm", pm, "", "parameters of pm, eq. 4");
     visit("subpixel", subpixel, "", "interpolation of the winner's cost");
     visit(
         "uniqueness_pct", uniqueness_pct, "%",
@@ -91,7 +44,6 @@ struct BlockMatcherOptions {
     visit("speckle_window", speckle_window, "px",
           "connected regions up to this size are dropped; 0 keeps all");
     visit("speckle_range", speckle_range, "px", "largest step inside a connected region");
-    visit("threads", threads, "", "threads over bands of rows; 0 for all cores");
   }
 };
 

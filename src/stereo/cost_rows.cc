@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include <sgf/metrics/registry.h>
 #include <sgf/metrics/sample_image.h>
 #include <sgf/stereo/cost_rows.h>
+#include <sgf/stereo/sgf_image.h>
 
 namespace sgf::stereo::internal {
 namespace {
@@ -23,7 +25,7 @@ using metrics::SampleImage;
 struct Mirror {
   int width, min_disparity, before, after;
 
-  Mirror(int image_width, const BlockMatcherOptions& options)
+  Mirror(int image_width, const CostOptions& options)
       : width(image_width),
         min_disparity(options.min_disparity),
         before(std::max(0, -options.min_disparity)),
@@ -92,8 +94,7 @@ struct SamplePair {
   Mirror mirror;
   int num_disparities;
 
-  SamplePair(const cv::Mat& left_image, const cv::Mat& right_image,
-             const BlockMatcherOptions& options)
+  SamplePair(const cv::Mat& left_image, const cv::Mat& right_image, const CostOptions& options)
       : left(metrics::MakeSampleImage(left_image, options.gradient, options.epsilon, options.tau)),
         right(
             metrics::MakeSampleImage(right_image, options.gradient, options.epsilon, options.tau)),
@@ -232,33 +233,87 @@ class CensusCostRows final : public CostRows {
   int num_disparities_;
 };
 
+// MeshStereo's own cost.
+class CensusSobelCostRows final : public CostRows {
+ public:
+  CensusSobelCostRows(CensusCostRows census, const cv::Mat1b& left_sobel,
+                      const cv::Mat1b& right_sobel, const Mirror& mirror, int num_disparities)
+      : census_(std::move(census)),
+        left_(left_sobel),
+        right_(Mirrored<uint8_t>(right_sobel, mirror)),
+        mirror_(mirror),
+        num_disparities_(num_disparities) {}
+
+  void Row(int y, int stride, uint16_t* costs) override {
+    census_.Row(y, stride, costs);
+    for (int x = 0; x < mirror_.width; ++x, costs += stride) {
+      const int i = left_(y, x);
+      const uint8_t* j = right_[y] + mirror_.Column(x);
+      for (int d = 0; d < num_disparities_; ++d)
+        costs[d] = static_cast<uint16_t>(2 * costs[d] + std::abs(i - j[d]));
+    }
+  }
+
+ private:
+  CensusCostRows census_;
+  cv::Mat1b left_, right_;
+  Mirror mirror_;
+  int num_disparities_;
+};
+
+// Horizontal Sobel response of an 8-bit image, halved, around 128.
+cv::Mat1b HorizontalSobel(const cv::Mat& image) {
+  if (image.type() != CV_8UC1)
+    throw Error("metric", fmt::format("{} needs 8-bit images, got {}", kCensusSobel,
+                                      cv::typeToString(image.type())));
+  cv::Mat1b sobel;
+  cv::Sobel(image, sobel, CV_8U, 1, 0, 3, 0.5, 128, cv::BORDER_REPLICATE | cv::BORDER_ISOLATED);
+  return sobel;
+}
+
 template <class Metric>
-Metric WithParameters(Metric metric, const BlockMatcherOptions& options) {
+Metric WithParameters(Metric metric, const CostOptions& options) {
   if constexpr (std::is_same_v<Metric, metrics::Pm>)
     return {options.pm.alpha, options.pm.tau_c, options.pm.tau_g};
   else
     return metric;
 }
 
+CensusCostRows MakeCensusRows(const cv::Mat& left, const cv::Mat& right,
+                              const CostOptions& options) {
+  return {std::make_shared<const metrics::CensusImage>(metrics::ComputeCensus(left)),
+          std::make_shared<const metrics::CensusImage>(metrics::ComputeCensus(right)),
+          Mirror(left.cols, options), options.num_disparities};
+}
+
+CostRowsFactory MakeCensusSobelFactory(const cv::Mat& left, const cv::Mat& right,
+                                       const CostOptions& options, int window) {
+  const CensusSobelCostRows rows(MakeCensusRows(left, right, options), HorizontalSobel(left),
+                                 HorizontalSobel(right), Mirror(left.cols, options),
+                                 options.num_disparities);
+  return {[=] { return std::make_unique<CensusSobelCostRows>(rows); }, window};
+}
+
 // One maker per kind of dissimilarity.
 template <class Metric>
 CostRowsFactory MakeFactory(const Metric& metric, const cv::Mat& left, const cv::Mat& right,
-                            const BlockMatcherOptions& options) {
-  if constexpr (metrics::PointMetric<Metric>) {
+                            const CostOptions& options, int window) {
+  if constexpr (std::is_same_v<Metric, metrics::Sgf>) {
+    auto l = std::make_shared<const SgfImage>(PrepareSgf(left, options));
+    auto r = std::make_shared<const SgfImage>(PrepareSgf(right, options));
+    const int width = left.cols;
+    return {[=] { return MakeSgfCostRows(width, options, l, r); }, window};
+  } else if constexpr (metrics::PointMetric<Metric>) {
     auto pair = std::make_shared<const SamplePair>(left, right, options);
-    return {[=] { return std::make_unique<PointCostRows<Metric>>(metric, pair); }, options.window};
+    return {[=] { return std::make_unique<PointCostRows<Metric>>(metric, pair); }, window};
   } else if constexpr (metrics::WindowMetric<Metric>) {
     auto pair = std::make_shared<SamplePair>(left, right, options);
     ForEachPlane(pair->left, Snap);
     ForEachPlane(pair->right, Snap);
-    const int window = options.window;
     return {[pair, window] { return std::make_unique<WindowCostRows<Metric>>(pair, window); }, 1};
   } else if constexpr (Metric::kInfo.traits.kind == metrics::MetricKind::kSignature) {
-    auto l = std::make_shared<const metrics::CensusImage>(metrics::ComputeCensus(left));
-    auto r = std::make_shared<const metrics::CensusImage>(metrics::ComputeCensus(right));
-    const Mirror mirror(left.cols, options);
-    const int count = options.num_disparities;
-    return {[=] { return std::make_unique<CensusCostRows>(l, r, mirror, count); }, options.window};
+    const auto census = MakeCensusRows(left, right, options);
+    return {[=] { return std::make_unique<CensusCostRows>(census); }, window};
   } else {
     throw std::logic_error("not a stereo cost; CheckOptions lets it through");
   }
@@ -267,10 +322,45 @@ CostRowsFactory MakeFactory(const Metric& metric, const cv::Mat& left, const cv:
 }  // namespace
 
 CostRowsFactory PrepareCostRows(const cv::Mat& left, const cv::Mat& right,
-                                const BlockMatcherOptions& options) {
+                                const CostOptions& options, int window) {
+  if (options.metric == kCensusSobel) return MakeCensusSobelFactory(left, right, options, window);
   return metrics::VisitMetric(options.metric, [&](auto metric) {
-    return MakeFactory(WithParameters(metric, options), left, right, options);
+    return MakeFactory(WithParameters(metric, options), left, right, options, window);
   });
+}
+
+uint32_t ByteScaleQ16(const CostRowsFactory& factory, cv::Size size, int num_disparities) {
+  constexpr int kStep = 8;
+  std::vector<uint16_t> row(static_cast<size_t>(size.width) * num_disparities);
+  uint64_t total = 0, count = 0;
+  for (int y = 0; y < size.height; y += kStep) {
+    factory.make()->Row(y, num_disparities, row.data());  // a maker's rows are consecutive
+    total = std::accumulate(row.begin(), row.end(), total);
+    count += row.size();
+  }
+  return static_cast<uint32_t>(
+      std::min<uint64_t>((count * kMeanByteCost << 16) / std::max<uint64_t>(total, 1), 1U << 24));
+}
+
+ByteCostRows::ByteCostRows(const CostRowsFactory& factory, uint32_t scale_q16, int width,
+                           int num_disparities)
+    : rows_(factory.make()),
+      scale_q16_(scale_q16),
+      width_(width),
+      num_disparities_(num_disparities),
+      limit_(std::min(65535U, (256U << 16) / std::max(1U, scale_q16))),
+      row_(static_cast<size_t>(width) * num_disparities) {}
+
+void ByteCostRows::Row(int y, int stride, uint8_t* costs) {
+  rows_->Row(y, num_disparities_, row_.data());
+  const uint32_t largest = 255, half = 1U << 15;
+  const uint16_t* from = row_.data();
+  for (int x = 0; x < width_; ++x, costs += stride, from += num_disparities_)
+    for (int d = 0; d < num_disparities_; ++d) {
+      // The product fits 32 bits because costs are cut where it passes 256 anyway.
+      const uint32_t cost = std::min<uint32_t>(from[d], limit_);
+      costs[d] = static_cast<uint8_t>(std::min((cost * scale_q16_ + half) >> 16, largest));
+    }
 }
 
 }  // namespace sgf::stereo::internal

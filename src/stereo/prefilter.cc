@@ -22,7 +22,7 @@ cv::Mat1f NormalizedResponse(const cv::Mat& image, int window) {
 
 }  // namespace
 
-cv::Mat ApplyPrefilter(const cv::Mat& image, const BlockMatcherOptions& options) {
+cv::Mat ApplyPrefilter(const cv::Mat& image, const CostOptions& options) {
   if (options.prefilter == Prefilter::kNone) return image;
   if (image.type() != CV_8UC1)
     throw Error("prefilter",

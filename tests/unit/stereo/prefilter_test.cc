@@ -6,8 +6,8 @@
 namespace sgf::stereo {
 namespace {
 
-BlockMatcherOptions With(Prefilter prefilter) {
-  BlockMatcherOptions options;
+CostOptions With(Prefilter prefilter) {
+  CostOptions options;
   options.prefilter = prefilter;
   return options;
 }
@@ -41,7 +41,7 @@ TEST(Prefilter, NormalizedResponseIgnoresOffsetsAndKeepsContrast) {
 TEST(Prefilter, StaysWithinTheCap) {
   const cv::Mat1b image = TexturedImage({60, 40}, 2);
   for (const auto prefilter : {Prefilter::kXSobel, Prefilter::kNormalizedResponse}) {
-    BlockMatcherOptions options = With(prefilter);
+    CostOptions options = With(prefilter);
     options.prefilter_cap = 5;
     double low = 0, high = 0;
     cv::minMaxLoc(ApplyPrefilter(image, options), &low, &high);
