@@ -23,6 +23,7 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --only NAME...  only these experiments (see --list)
   --data DIR      folder with downloaded data sets; default: environment variable SGF_DATA, or none.
                   Without it the pairs that Debian packages ship are used.
+  --sanitize      test: only the C++ unit tests, under the address and undefined-behaviour sanitizers
   --full          render the full suite of eleven sequences (15 GB at most) instead of the short one
                   of four (2 GB at most)
   --jobs N        parallel jobs; default: the number of processors
@@ -147,20 +148,20 @@ build_progress() {
     }'
 }
 
-# build TESTS [TARGET...]: configures (TESTS: ON or OFF) and builds the targets, or all.
+# build PRESET TESTS [TARGET...]: configures (TESTS: ON or OFF) and builds the targets, or the preset's.
 build() {
-  local tests=$1 log=$logs/build.log
-  shift
-  cmake --preset release "-DSGF_BUILD_TESTS=$tests" >"$logs/configure.log" 2>&1 || {
+  local preset=$1 tests=$2 log=$logs/build.log
+  shift 2
+  cmake --preset "$preset" "-DSGF_BUILD_TESTS=$tests" >"$logs/configure.log" 2>&1 || {
     tail -n 20 "$logs/configure.log" >&2
     fail "configuring failed; log: $logs/configure.log"
   }
-  NINJA_STATUS='[%f/%t %e] ' cmake --build --preset release --parallel "$jobs" ${1+--target "$@"} 2>&1 |
+  NINJA_STATUS='[%f/%t %e] ' cmake --build --preset "$preset" --parallel "$jobs" ${1+--target "$@"} 2>&1 |
     build_progress "$log" || {
     grep -m 5 -A 5 'error' "$log" >&2 || tail -n 20 "$log" >&2
     fail "building failed; log: $log"
   }
-  printf '  built in %s\n' "$project/build/release"
+  printf '  built in %s\n' "$project/build/$preset"
 }
 
 # Whether the build folder was configured with tests: a developer's stays so.
@@ -171,16 +172,16 @@ tests_in_build() {
 # --- commands ------------------------------------------------------------------------------------
 
 clean() {
-  rm -rf build/release datasets/generated
+  rm -rf build/release build/sanitize datasets/generated
   find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + 2>/dev/null || true
-  echo "Removed build/release, datasets/generated and all of results but results/reference."
+  echo "Removed build/release, build/sanitize, datasets/generated and all of results but results/reference."
 }
 
 run_experiments() {
   echo "== packages [run] [report]"
   install_packages run report
   echo "== build"
-  build "$(tests_in_build)" sgf_eval sgf_render sgf_stereo sgf_study stereo_bench
+  build release "$(tests_in_build)" sgf_eval sgf_render sgf_stereo sgf_study stereo_bench
   cd paper
   exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${stages[@]}"
 }
@@ -189,16 +190,17 @@ run_tests() {
   echo "== packages [run] [report] [test]"
   install_packages run report test
   echo "== build"
-  build ON
+  build "$preset" ON
   echo "== tests"
   if [[ -n $data ]]; then export SGF_DATA=$data; fi
-  exec ctest --preset release --parallel "$jobs"
+  exec ctest --preset "$preset" --parallel "$jobs"
 }
 
 # --- command line --------------------------------------------------------------------------------
 
 mode=run
 stages=()
+preset=release
 full=()
 data=${SGF_DATA:-}
 jobs=$(nproc)
@@ -219,6 +221,7 @@ while (($#)); do
       data=$2
       shift
       ;;
+    --sanitize) preset=sanitize ;;
     --full) full=(--full) ;;
     --jobs)
       [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || wrong_usage "--jobs needs a positive number, not '${2:-}'"
@@ -237,6 +240,9 @@ done
 
 if [[ $mode == test && ${#stages[@]} -gt 0 ]]; then
   wrong_usage "--only chooses experiments; it does not go with test"
+fi
+if [[ $preset == sanitize && $mode != test ]]; then
+  wrong_usage "--sanitize goes with test only"
 fi
 if [[ -n $data ]]; then
   cd -- "$caller"

@@ -1,4 +1,4 @@
-"""Throughput of block matching from the JSON report of Google Benchmark.
+"""Throughput of stereo matching from the JSON report of Google Benchmark.
 
 Benchmarks are named case/implementation/isa/threads and count mde_per_s (10^6 disparities evaluated
 a second: width * height * disparities / 10^6 / time) and peak_mib (memory).
@@ -16,7 +16,11 @@ from sgf_paper import config, text
 
 KEYS = ["case", "implementation", "isa", "threads"]
 VALUES = ["mde_per_s", "peak_mib"]
-IMPLEMENTATIONS = ["opencv_bm", "sgf_bm"]
+# Ours and the peer that it stands against, with what the peer is called.
+PEERS = {
+    "sgf_bm": ("opencv_bm", "cv::StereoBM"),
+    "sgf_sgm": ("opencv_sgbm", "cv::StereoSGBM"),
+}
 
 
 class BenchError(Exception):
@@ -40,25 +44,26 @@ def read_report(path: Path) -> pd.DataFrame:
     return frame.groupby(KEYS, sort=False)[VALUES].median().reset_index()
 
 
-def _one_thread_opencv(speeds: pd.DataFrame, case: str, isa: str) -> float:
-    """cv::StereoBM on one thread: on the same instruction set, else its fastest."""
+def _one_thread_peer(speeds: pd.DataFrame, case: str, peer: str, isa: str) -> float:
+    """OpenCV's matcher on one thread: on the same instruction set, else its fastest."""
     opencv = speeds[
-        (speeds["case"] == case)
-        & (speeds["implementation"] == "opencv_bm")
-        & (speeds["threads"] == 1)
+        (speeds["case"] == case) & (speeds["implementation"] == peer) & (speeds["threads"] == 1)
     ]
     same = opencv[opencv["isa"] == isa]
     return (opencv if same.empty else same)["mde_per_s"].max()
 
 
 def ratios_to_opencv(speeds: pd.DataFrame) -> pd.DataFrame:
-    """sgf_bm's throughput over cv::StereoBM's, both on one thread, by case and instruction set."""
+    """Throughput of our matchers over their peers', both on one thread, by case and instruction set."""
     rows = []
-    one_thread = speeds[(speeds["implementation"] == "sgf_bm") & (speeds["threads"] == 1)]
+    one_thread = speeds[speeds["implementation"].isin(PEERS) & (speeds["threads"] == 1)]
     for row in one_thread.itertuples():
-        opencv = _one_thread_opencv(speeds, row.case, row.isa)
-        rows.append((row.case, row.isa, row.mde_per_s, opencv, row.mde_per_s / opencv))
-    return pd.DataFrame(rows, columns=["case", "isa", "sgf_bm", "opencv_bm", "ratio"])
+        peer, title = PEERS[row.implementation]
+        opencv = _one_thread_peer(speeds, row.case, peer, row.isa)
+        ratio = row.mde_per_s / opencv
+        rows.append((row.case, row.implementation, row.isa, row.mde_per_s, title, opencv, ratio))
+    columns = ["case", "implementation", "isa", "sgf", "peer", "opencv", "ratio"]
+    return pd.DataFrame(rows, columns=columns)
 
 
 def scaling(speeds: pd.DataFrame) -> pd.DataFrame:
@@ -74,13 +79,12 @@ def make_bench(name: str, report: Path, out: Path) -> None:
     """Writes <name>.csv and <name>.md."""
     experiment = config.load_experiment(name)
     speeds = read_report(report)
-    matchers = speeds[speeds["implementation"].isin(IMPLEMENTATIONS)]
-    text.write_csv(matchers, out / f"{name}.csv")
+    text.write_csv(speeds, out / f"{name}.csv")
     document = text.render(
         "bench.md.j2",
         experiment=experiment,
         context=json.loads(report.read_text())["context"],
-        speeds=matchers.to_dict("records"),
+        speeds=speeds.to_dict("records"),
         ratios=ratios_to_opencv(speeds).to_dict("records"),
         scaling=scaling(speeds).to_dict("records"),
     )

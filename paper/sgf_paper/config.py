@@ -44,9 +44,14 @@ def _build(cls: type, node: Any, where: str) -> Any:
 class Column:
     """One way of matching: a column of the paper's tables."""
 
-    implementation: str  # block_matcher or opencv_bm
+    implementation: str  # a method of sgf_stereo
     options: dict[str, Any] = field(default_factory=dict)
+    fill: bool = False  # holes of the disparity maps are filled
     extra: bool = False  # not a column of the paper
+
+    @property
+    def is_opencv(self) -> bool:
+        return self.implementation.startswith("opencv_")
 
 
 @dataclass(frozen=True)
@@ -71,10 +76,15 @@ class Sweep:
         """The paper's own columns, in order."""
         return [name for name, column in self.columns.items() if not column.extra]
 
+    @property
+    def sparse_columns(self) -> list[str]:
+        """Columns that may leave out pixels: not those whose holes are filled."""
+        return [name for name, column in self.columns.items() if not column.fill]
+
     def column_options(self, name: str) -> dict[str, Any]:
-        """Options of a column of our matcher on top of those that all share."""
+        """Options of a column on top of those that all columns of our matchers share."""
         column = self.columns[name]
-        shared = self.options if column.implementation == "block_matcher" else {}
+        shared = {} if column.is_opencv else self.options
         return {**shared, **column.options}
 
 
@@ -84,11 +94,25 @@ class Parameters:
     uniqueness: float  # percent
 
 
-@dataclass
+@dataclass(frozen=True)
 class Tuning:
     objective: str
     kept_pct: float
-    near_duplicates: list[list[str]] = field(default_factory=list)
+
+
+@dataclass
+class TableBlock:
+    """The columns of one sweep in a table."""
+
+    sweep: Sweep  # by its name in the file
+    fixed: dict[str, Any]
+    fixed_of: dict[str, dict[str, Any]] = field(default_factory=dict)
+    tuning: Tuning | None = None
+    published: str = ""  # matcher in the table's entry of the published values
+
+    def parameters(self, column: str) -> Parameters:
+        """The fixed parameters of a column."""
+        return Parameters(**{**self.fixed, **self.fixed_of.get(column, {})})
 
 
 @dataclass
@@ -96,18 +120,28 @@ class Table:
     kind: str
     name: str
     title: str
-    sweep: str
     datasets: list[str]
     published: str
     published_dataset: str
-    fixed: dict[str, Any]
     quantities: list[str]
-    tuning: Tuning
-    fixed_of: dict[str, dict[str, Any]] = field(default_factory=dict)
+    blocks: list[TableBlock]
+    near_duplicates: list[list[str]] = field(default_factory=list)
 
-    def parameters(self, column: str) -> Parameters:
-        """The fixed parameters of a column."""
-        return Parameters(**{**self.fixed, **self.fixed_of.get(column, {})})
+    @property
+    def sweeps(self) -> list[Sweep]:
+        return [block.sweep for block in self.blocks]
+
+    @property
+    def curve_blocks(self) -> list[TableBlock]:
+        """The blocks of matchers that can be made to keep more or fewer pixels."""
+        return [block for block in self.blocks if len(block.sweep.grid.uniqueness) > 1]
+
+    def block(self, sweep: str) -> TableBlock:
+        """The block of a sweep."""
+        for block in self.blocks:
+            if block.sweep.name == sweep:
+                return block
+        raise ConfigError(f"table {self.name} has no block of sweep {sweep}")
 
     def present(self, datasets: dict[str, Dataset]) -> list[str]:
         """Names of the data sets to run among those that were found."""
@@ -126,6 +160,24 @@ class Density:
     tables: list[str]
     quantities: list[str]
     kept_pct: list[float]
+
+
+@dataclass
+class LightChange:
+    """What changes between the images of a pair, and on which columns its effect is measured."""
+
+    kind: str
+    name: str
+    title: str
+    table: str  # has the sweeps and the fixed parameters
+    datasets: list[str]
+    columns: list[str]
+    twins: dict[str, str]  # scenes taken under a change: the same scene without it, or empty
+    changes: dict[str, dict[str, Any]]  # made to right images
+
+    def present(self, datasets: dict[str, Dataset]) -> list[str]:
+        """Names of the data sets to run among those that were found."""
+        return [name for name in self.datasets if name in datasets]
 
 
 @dataclass(frozen=True)
@@ -152,7 +204,7 @@ class DisparityFigure:
     kind: str
     name: str
     title: str
-    sweep: str
+    sweeps: list[str]
     parameters_of: str
     columns: list[str]
     groups: list[SceneGroup]
@@ -335,7 +387,7 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Sequences, Table, Density, DisparityFigure, Benchmark, SemiDense, SelfMatch, ShiftProfile
+    ContactSheet, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, SemiDense, SelfMatch, ShiftProfile
 ]
 
 
@@ -373,18 +425,33 @@ def load_sweep(name: str) -> Sweep:
     return sweep
 
 
+def _build_block(node: dict[str, Any], where: str) -> TableBlock:
+    block = _build(TableBlock, node, where)
+    if block.tuning is not None:
+        block.tuning = _build(Tuning, block.tuning, f"{where}: tuning")
+    _build(Parameters, block.fixed, f"{where}: fixed")
+    block.sweep = load_sweep(block.sweep)
+    for column in block.sweep.columns:
+        parameters = block.parameters(column)
+        if parameters.window not in block.sweep.grid.windows:
+            raise ConfigError(f"{where}: window {parameters.window} is not on the sweep's grid")
+        if parameters.uniqueness not in block.sweep.grid.uniqueness:
+            raise ConfigError(f"{where}: uniqueness {parameters.uniqueness} is not on the sweep's grid")
+    return block
+
+
 def _build_table(node: dict[str, Any], where: str) -> Table:
     table = _build(Table, node, where)
-    table.tuning = _build(Tuning, table.tuning, f"{where}: tuning")
-    _build(Parameters, table.fixed, f"{where}: fixed")
-    sweep = load_sweep(table.sweep)
-    for column in sweep.columns:
-        parameters = table.parameters(column)
-        if parameters.window not in sweep.grid.windows:
-            raise ConfigError(f"{where}: window {parameters.window} is not on the sweep's grid")
-        if parameters.uniqueness not in sweep.grid.uniqueness:
-            raise ConfigError(f"{where}: uniqueness {parameters.uniqueness} is not on the sweep's grid")
+    table.blocks = [_build_block(block, f"{where}: blocks") for block in table.blocks]
     return table
+
+
+def _build_light_change(node: dict[str, Any], where: str) -> LightChange:
+    experiment = _build(LightChange, node, where)
+    for sweep in load_experiment(experiment.table).sweeps:
+        if unknown := set(experiment.columns) - set(sweep.columns):
+            raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep.name}")
+    return experiment
 
 
 def _build_group(node: dict[str, Any], where: str) -> SceneGroup:
@@ -396,9 +463,9 @@ def _build_group(node: dict[str, Any], where: str) -> SceneGroup:
 def _build_figure(node: dict[str, Any], where: str) -> DisparityFigure:
     figure = _build(DisparityFigure, node, where)
     figure.groups = [_build_group(group, f"{where}: groups") for group in figure.groups]
-    unknown = set(figure.columns) - set(load_sweep(figure.sweep).columns)
-    if unknown:
-        raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {figure.sweep}")
+    for sweep in figure.sweeps:
+        if unknown := set(figure.columns) - set(load_sweep(sweep).columns):
+            raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep}")
     return figure
 
 
@@ -442,6 +509,7 @@ BUILDERS = {
     "contact_sheet": partial(_build, ContactSheet),
     "density": partial(_build, Density),
     "disparity_figure": _build_figure,
+    "light_change": _build_light_change,
     "self_match": _build_self_match,
     "semi_dense": _build_semi_dense,
     "sequences": partial(_build, Sequences),
@@ -467,7 +535,12 @@ def load_experiments(kind: str) -> dict[str, Any]:
 
 
 def load_published(table: Table, matcher: str) -> dict[str, dict[str, float]]:
-    """The paper's values as {quantity: {column: value}} in the file's units (px, percent)."""
+    """The paper's values as {quantity: {column: value}} in the file's units (px, percent).
+
+    @param matcher of the published entry; empty for one that is not in the paper.
+    """
+    if not matcher:
+        return {}
     entry = read_yaml(PUBLISHED).get(table.published)
     if entry is None or matcher not in entry:
         raise ConfigError(f"{PUBLISHED}: no entry {table.published}.{matcher}")

@@ -83,7 +83,7 @@ def find_datasets(settings: Settings) -> dict[str, Dataset]:
 
 def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
     """Whether any data set that a stage can use is at hand."""
-    if stage.kind == "table":
+    if stage.kind in ("table", "light_change"):
         return bool(stage.present(datasets))
     if stage.kind == "density":
         return any(config.load_experiment(table).present(datasets) for table in stage.tables)

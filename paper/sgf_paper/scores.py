@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sgf_paper.config import Parameters, Sweep, Table
+from sgf_paper.config import Parameters, Sweep, TableBlock
 
 ERRORS = ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct", "d1_pct"]
 RAW_COLUMNS = [
@@ -59,10 +59,11 @@ def at(scores: pd.DataFrame, parameters: Parameters) -> pd.DataFrame:
     ]
 
 
-def at_fixed(scores: pd.DataFrame, table: Table, sweep: Sweep) -> pd.DataFrame:
+def at_fixed(scores: pd.DataFrame, block: TableBlock) -> pd.DataFrame:
     """The lines of each column's fixed parameter set, in the sweep's order of columns."""
     parts = [
-        at(scores[scores["column"] == column], table.parameters(column)) for column in sweep.columns
+        at(scores[scores["column"] == column], block.parameters(column))
+        for column in block.sweep.columns
     ]
     return pd.concat(parts, ignore_index=True)
 

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from sgf_paper import bench, config
+from sgf_paper import bench, config, text
 from sgf_paper.config import Dataset, Experiment
 
 FILES = {
     "table": "tables/{}.md (.csv, .tex, _scenes.csv, _wins.csv, _tuned.csv)",
     "density": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _equal.csv)",
     "disparity_figure": "figures/{}.png (.pdf)",
+    "light_change": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "benchmark": "tables/{}.md (.csv)",
     "contact_sheet": "figures/{}.png (.pdf)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
@@ -24,6 +25,7 @@ MAIN_FILE = {
     "table": "tables/{}.csv",
     "density": "figures/{}.png",
     "disparity_figure": "figures/{}.png",
+    "light_change": "tables/{}.csv",
     "benchmark": "tables/{}.csv",
     "contact_sheet": "figures/{}.png",
     "sequences": "tables/{}.csv",
@@ -39,18 +41,20 @@ def main_file(stage: Experiment, results: Path) -> Path:
 
 
 def _table_lines(path: Path) -> list[str]:
-    """Per data set and region the paper's columns by mean error."""
+    """Per data set, region and matcher the paper's columns by mean error."""
     frame = pd.read_csv(path)
-    main = config.load_sweep(config.load_experiment(path.stem).sweep).main_columns
+    main = config.load_experiment(path.stem).sweeps[0].main_columns
     measured = frame[frame["measured"].notna() & frame["cost"].isin(main)]
     lines = []
-    for (dataset, region), block in measured.groupby(["dataset", "region"], sort=False):
+    keys = ["dataset", "region", "matcher"]
+    for (dataset, region, matcher), block in measured.groupby(keys, sort=False):
         wide = block.pivot(index="cost", columns="quantity", values="measured")
         order = wide.sort_values("mean_px")
         texts = [f"{cost} {row.mean_px:.2f}" for cost, row in order.iterrows()]
         best = order.iloc[0]
         lines.append(
-            f"{dataset} {region}, {block['scenes'].max()} scenes, mean px: {', '.join(texts)};"
+            f"{dataset} {region}, {block['scenes'].max()} scenes, {text.matcher_title(matcher)},"
+            f" mean px: {', '.join(texts)};"
             f" {order.index[0]}: bad 2 {best.bad2_pct:.1f} %, invalid {best.invalid_pct:.1f} %"
         )
     return lines
@@ -59,13 +63,14 @@ def _table_lines(path: Path) -> list[str]:
 def _bench_lines(path: Path) -> list[str]:
     speeds = pd.read_csv(path)
     lines = [
-        f"{row.case}: sgf {row.ratio:.2f} times cv::StereoBM ({row.isa}, 1 thread)"
+        f"{row.case}: {row.implementation} {row.ratio:.2f} times {row.peer} ({row.isa}, 1 thread)"
         for row in bench.ratios_to_opencv(speeds).itertuples()
     ]
     scaling = bench.scaling(speeds)
     lines += [
-        f"{row.case}: sgf on {row.threads} threads {row.ratio:.2f} times 1 thread ({row.isa})"
-        for row in scaling[scaling["implementation"] == "sgf_bm"].itertuples()
+        f"{row.case}: {row.implementation} on {row.threads} threads {row.ratio:.2f} times 1 thread"
+        f" ({row.isa})"
+        for row in scaling[scaling["implementation"].isin(bench.PEERS)].itertuples()
     ]
     return lines
 
@@ -95,9 +100,24 @@ def _self_match_lines(path: Path) -> list[str]:
     return lines
 
 
+def _light_change_lines(path: Path) -> list[str]:
+    """Per data set, region, case and matcher the columns by the rise of their mean error."""
+    frame = pd.read_csv(path, dtype={"case": str}).dropna(subset="mean_px_rise")
+    lines = []
+    keys = ["dataset", "region", "case", "matcher"]
+    for (dataset, region, case, matcher), rows in frame.groupby(keys, sort=False):
+        order = rows.sort_values("mean_px_rise")
+        texts = [f"{row.cost} {row.mean_px_rise:+.2f}" for row in order.itertuples()]
+        where = f"{dataset} {region}, {case}, {text.matcher_title(matcher)}"
+        lines.append(f"{where}, rise of mean px: {', '.join(texts)}")
+    return lines
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
+    if stage.kind == "light_change":
+        return _light_change_lines(main_file(stage, results))
     if stage.kind == "benchmark":
         return _bench_lines(main_file(stage, results))
     if stage.kind == "semi_dense":

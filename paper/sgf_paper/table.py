@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import pandas as pd
 
 from sgf_paper import config, scores, text, tuning
-from sgf_paper.config import Sweep, Table
+from sgf_paper.config import Sweep, Table, TableBlock
 
 CSV_COLUMNS = ["dataset", "region", "matcher", "cost", "quantity", "measured", "published", "scenes"]
+CHOICE_COLUMNS = ["dataset", "region", "matcher", "column", "fold", "parameters", "reached"]
 NAN = float("nan")
 # Options that a sweep gives each scene and grid point, under our names and OpenCV's.
 SET_BY_SWEEP = {
     "window", "block_size", "uniqueness_pct", "uniqueness_ratio", "num_disparities", "threads",
 }  # fmt: skip
+OPENCV_BY_WINDOW = {"p1", "p2"}  # penalties that cv::StereoSGBM's users scale with the window
 
 
 @dataclass
@@ -27,24 +29,25 @@ class Report:
     tuned: pd.DataFrame
     scenes: pd.DataFrame
     wins: pd.DataFrame
-    choices: pd.DataFrame  # dataset, region, and the fields of tuning.Choice
-    folds: dict[str, dict[str, int]]  # by data set and scene
+    choices: pd.DataFrame  # dataset, region, matcher, and the fields of tuning.Choice
 
 
-class TableMaker:
-    """Computes one table's report from the raw scores of the data sets at hand."""
+class BlockMaker:
+    """Computes one block's part of a table's report from the raw scores of the data sets at hand."""
 
-    def __init__(self, table: Table, sweep: Sweep, raw: Path, present: list[str]):
+    def __init__(self, table: Table, block: TableBlock, raw: Path, present: list[str]):
         self.table = table
-        self.sweep = sweep
-        self.published = config.load_published(table, sweep.matcher)
-        self.scores = {name: scores.read_scores(raw, sweep, name) for name in present}
+        self.block = block
+        self.sweep = block.sweep
+        self.published = config.load_published(table, block.published)
+        self.scores = {name: scores.read_scores(raw, self.sweep, name) for name in present}
 
     def make(self) -> Report:
         """Computes all parts."""
-        fixed = {name: scores.at_fixed(s, self.table, self.sweep) for name, s in self.scores.items()}
-        tuned, choices, folds = self._tuned()
-        rows = [row for name, lines in fixed.items() for row in self._dataset_rows(name, lines)]
+        fixed = {name: scores.at_fixed(s, self.block) for name, s in self.scores.items()}
+        tuned, choices = self._tuned()
+        columns = list(self.sweep.columns)
+        rows = [row for name, lines in fixed.items() for row in self._dataset_rows(name, lines, columns)]
         if self.table.published_dataset not in self.scores:
             rows += self._published_rows()
         return Report(
@@ -53,7 +56,6 @@ class TableMaker:
             scenes=self._scenes(fixed),
             wins=self._wins(fixed),
             choices=choices,
-            folds=folds,
         )
 
     def _published_value(self, dataset: str, column: str, quantity: str) -> float:
@@ -75,11 +77,11 @@ class TableMaker:
             "scenes": count,
         }
 
-    def _dataset_rows(self, dataset: str, lines: pd.DataFrame) -> list[dict]:
+    def _dataset_rows(self, dataset: str, lines: pd.DataFrame, columns: list[str]) -> list[dict]:
         rows = []
         for region in scores.regions_of(lines):
             in_region = lines[lines["region"] == region]
-            for column in self.sweep.columns:
+            for column in columns:
                 per_scene = in_region[in_region["column"] == column]
                 for quantity in self.table.quantities:
                     values = per_scene[scores.score_name(quantity)]
@@ -97,19 +99,22 @@ class TableMaker:
             if quantity in self.published
         ]
 
-    def _tuned(self) -> tuple[list[dict], pd.DataFrame, dict[str, dict[str, int]]]:
-        rows, choices, folds = [], [], {}
-        for dataset, every in self.scores.items():
-            scenes = list(every["scene"].unique())
-            folds[dataset] = tuning.assign_folds(scenes, self.table.tuning.near_duplicates)
+    def _tuned(self) -> tuple[list[dict], pd.DataFrame]:
+        rows, choices = [], []
+        columns = self.sweep.sparse_columns
+        for dataset, every in self.scores.items() if self.block.tuning else ():
+            every = every[every["column"].isin(columns)]
+            folds = folds_of(self.table, every)
             for region in scores.regions_of(every):
                 in_region = every[every["region"] == region]
-                lines, chosen = tuning.cross_validate(in_region, self.table.tuning, folds[dataset])
+                lines, chosen = tuning.cross_validate(in_region, self.block.tuning, folds)
                 if chosen:
-                    rows += self._dataset_rows(dataset, lines)
-                choices += [_choice_row(dataset, region, choice) for choice in chosen]
-        columns = ["dataset", "region", "column", "fold", "window", "uniqueness", "reached"]
-        return rows, pd.DataFrame(choices, columns=columns), folds
+                    rows += self._dataset_rows(dataset, lines, columns)
+                choices += [
+                    (dataset, region, self.sweep.matcher, c.column, c.fold, c.parameters, c.reached)
+                    for c in chosen
+                ]
+        return rows, pd.DataFrame(choices, columns=CHOICE_COLUMNS)
 
     def _scenes(self, fixed: dict[str, pd.DataFrame]) -> pd.DataFrame:
         lines = pd.concat(fixed.values(), ignore_index=True)
@@ -144,20 +149,37 @@ class TableMaker:
         return {column: int(won[column]) for column in self.sweep.main_columns}, len(wide)
 
 
-def _choice_row(dataset: str, region: str, choice: tuning.Choice) -> tuple:
-    parameters = choice.parameters
-    return (
-        dataset, region, choice.column, choice.fold,
-        parameters.window, parameters.uniqueness, choice.reached,
-    )  # fmt: skip
+def folds_of(table: Table, lines: pd.DataFrame) -> dict[str, int]:
+    """The fold of each scene of a data set."""
+    return tuning.assign_folds(list(lines["scene"].unique()), table.near_duplicates)
+
+
+def make_report(table: Table, raw: Path, present: list[str]) -> Report:
+    """The report of all blocks, sorted by data set and region so that matchers stand together."""
+    parts = [BlockMaker(table, block, raw, present).make() for block in table.blocks]
+    names = [*present, table.published_dataset]
+
+    def place(column: pd.Series) -> pd.Series:
+        order = names if column.name == "dataset" else ["all", "noc"]
+        return column.map(order.index)
+
+    def merge(name: str) -> pd.DataFrame:
+        frames = [getattr(part, name) for part in parts]
+        filled = [frame for frame in frames if not frame.empty]  # empty ones have no types
+        frame = pd.concat(filled or frames[:1], ignore_index=True)
+        return frame.sort_values(["dataset", "region"], key=place, kind="stable", ignore_index=True)
+
+    return Report(**{part.name: merge(part.name) for part in fields(Report)})
 
 
 def choice_texts(choices: pd.DataFrame) -> dict[str, dict[str, list[str]]]:
-    """Parameters by "data set, region" and column: one text for each fold that they score."""
+    """Parameters by "data set, region, matcher" and column: one text for each fold they score."""
     texts: dict[str, dict[str, list[str]]] = {}
     for choice in choices.itertuples():
-        columns = texts.setdefault(f"{choice.dataset}, {choice.region}", {})
-        shown = f"{choice.window} px, {choice.uniqueness:g} %{'' if choice.reached else ' *'}"
+        title = f"{choice.dataset}, {choice.region}, {text.matcher_title(choice.matcher)}"
+        columns = texts.setdefault(title, {})
+        parameters = choice.parameters
+        shown = f"{parameters.window} px, {parameters.uniqueness:g} %{'' if choice.reached else ' *'}"
         columns.setdefault(choice.column, ["–", "–"])[choice.fold] = shown
     return texts
 
@@ -168,7 +190,8 @@ def options_of_columns(raw: Path, sweep: Sweep, dataset: str) -> dict[str, str]:
     for column in sweep.columns:
         path = scores.raw_path(raw, sweep.name, dataset, column).with_suffix(".options.yaml")
         options = config.read_yaml(path)["options"]
-        fixed = {key: value for key, value in options.items() if key not in SET_BY_SWEEP}
+        varying = SET_BY_SWEEP | (OPENCV_BY_WINDOW if sweep.columns[column].is_opencv else set())
+        fixed = {key: value for key, value in options.items() if key not in varying}
         lines[column] = ", ".join(text.flatten(fixed))
     return lines
 
@@ -184,23 +207,21 @@ def write_csvs(report: Report, out: Path, name: str) -> None:
 def make_table(name: str, raw: Path, listing: Path, out: Path) -> None:
     """Makes table `name` from the raw scores in folder `raw`."""
     table = config.load_experiment(name)
-    sweep = config.load_sweep(table.sweep)
     datasets = config.read_datasets(listing)
     present = table.present(datasets)
-    report = TableMaker(table, sweep, raw, present).make()
+    report = make_report(table, raw, present)
     write_csvs(report, out, name)
+    main = table.blocks[0].sweep.main_columns
+    scenes = report.scenes.groupby("dataset", sort=False)
     context = {
         "table": table,
-        "sweep": sweep,
         "labels": [text.LABELS[quantity] for quantity in table.quantities],
         "absent": table.absent(datasets),
-        "fixed": text.make_blocks(report.fixed, report.wins, table.quantities, sweep.main_columns),
-        "tuned": text.make_blocks(
-            report.tuned, report.wins.iloc[:0], table.quantities, sweep.main_columns
-        ),
+        "fixed": text.make_blocks(report.fixed, report.wins, table.quantities, main),
+        "tuned": text.make_blocks(report.tuned, report.wins.iloc[:0], table.quantities, main),
         "choices": choice_texts(report.choices),
-        "folds": report.folds,
-        "options": options_of_columns(raw, sweep, present[0]),
+        "folds": {dataset: folds_of(table, lines) for dataset, lines in scenes},
+        "options": {s.name: options_of_columns(raw, s, present[0]) for s in table.sweeps},
     }
     for extension in ("md", "tex"):
         document = text.render(f"table.{extension}.j2", **context)

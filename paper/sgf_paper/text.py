@@ -19,6 +19,12 @@ LABELS = {
     "d1_pct": "D1 %",
     "invalid_pct": "invalid %",
 }
+MATCHERS = {"stereo_bm": "StereoBM", "stereo_mesh": "MeshStereo", "stereo_sgm": "SGM"}
+
+
+def matcher_title(matcher: str) -> str:
+    """What a matcher is called in tables and figures."""
+    return MATCHERS.get(matcher, matcher)
 
 
 @dataclass(frozen=True)
@@ -40,10 +46,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Block:
-    """The lines of one data set and region."""
+    """The lines of one data set, region and matcher."""
 
     dataset: str
     region: str
+    matcher: str  # its title
     scenes: int
     rows: list[Row]
 
@@ -85,21 +92,23 @@ def _won(wins: pd.DataFrame, cost: str) -> str:
 def make_blocks(
     frame: pd.DataFrame, wins: pd.DataFrame, quantities: list[str], main: list[str]
 ) -> list[Block]:
-    """Cuts a table's lines into one block per data set and region.
+    """Cuts a table's lines into one block per data set, region and matcher.
 
     @param wins scenes won per column; may be empty.
     @param main the paper's own columns.
     """
     blocks = []
-    for (dataset, region), block in frame.groupby(["dataset", "region"], sort=False):
+    keys = ["dataset", "region", "matcher"]
+    for (dataset, region, matcher), block in frame.groupby(keys, sort=False):
         best = _best(block, main)
-        own_wins = wins[(wins["dataset"] == dataset) & (wins["region"] == region)]
+        own_wins = wins[(wins[keys] == [dataset, region, matcher]).all(axis="columns")]
         rows = []
         for cost, lines in block.groupby("cost", sort=False):
             values = lines.set_index("quantity")
             cells = [_cell(values, quantity, best) for quantity in quantities]
             rows.append(Row(cost, cost not in main, cells, _won(own_wins, cost)))
-        blocks.append(Block(dataset, region, int(block["scenes"].max()), rows))
+        title = matcher_title(matcher)
+        blocks.append(Block(dataset, region, title, int(block["scenes"].max()), rows))
     return blocks
 
 
@@ -129,4 +138,5 @@ def render(template: str, **context: object) -> str:
         keep_trailing_newline=True,
     )
     environment.filters["latex"] = _latex
+    environment.filters["matcher"] = matcher_title
     return environment.get_template(template).render(**context)

@@ -38,12 +38,34 @@ class Gain {
   double corner2_, sigma_px_;
 };
 
+// Keeps 0 and 255 as they are.
+double Curve(double level, double exponent) { return 255 * std::pow(level / 255, exponent); }
+
+// What happens to light: between the two gammas. The channels of a pixel stand side by side.
+void ChangeLight(cv::Mat1d& levels, int channels, const ImageChange& change) {
+  const Gain gain(cv::Size(levels.cols / channels, levels.rows), change);
+  const bool curved = change.gamma != 1;
+  for (int y = 0; y < levels.rows; ++y)
+    for (int x = 0; x < levels.cols; ++x) {
+      double& level = levels(y, x);
+      if (curved) level = Curve(level, change.gamma);
+      level *= gain.At(cv::Point2d(x / channels, y));
+      if (curved && change.encode) level = Curve(level, 1 / change.gamma);
+    }
+}
+
+void AddNoise(cv::Mat1d& levels, double deviation, uint64_t seed) {
+  uint64_t index = 0;
+  for (double& level : levels) level += deviation * Gaussian(seed, index++);
+}
+
 }  // namespace
 
 void CheckChange(const ImageChange& c) {
   for (const double value : {c.light_x, c.light_y, c.offset})
     Require(std::isfinite(value), "light_x, light_y and offset", "finite", value);
   Require(c.blur >= 0 && std::isfinite(c.blur), "blur", "finite and not negative", c.blur);
+  Require(c.gamma > 0 && std::isfinite(c.gamma), "gamma", "finite and positive", c.gamma);
   Require(c.light > -1 && std::isfinite(c.light), "light", "finite and above -1", c.light);
   Require(c.light_radius > 0 && std::isfinite(c.light_radius), "light_radius",
           "finite and positive", c.light_radius);
@@ -53,20 +75,18 @@ void CheckChange(const ImageChange& c) {
   Require(c.noise >= 0 && std::isfinite(c.noise), "noise", "finite and not negative", c.noise);
 }
 
-cv::Mat ApplyChange(const cv::Mat1b& image, const ImageChange& change, uint64_t seed) {
+cv::Mat ApplyChange(const cv::Mat& image, const ImageChange& change, uint64_t seed) {
   CheckChange(change);
-  cv::Mat1d changed;
-  image.convertTo(changed, CV_64F);
-  if (change.blur > 0) cv::GaussianBlur(changed, changed, cv::Size(), change.blur);
-  const Gain gain(image.size(), change);
-  for (int y = 0; y < image.rows; ++y)
-    for (int x = 0; x < image.cols; ++x) {
-      const uint64_t index = static_cast<uint64_t>(y) * image.cols + x;
-      changed(y, x) = changed(y, x) * gain.At(cv::Point2d(x, y)) + change.offset;
-      if (change.noise > 0) changed(y, x) += change.noise * Gaussian(seed, index);
-    }
+  const int channels = image.channels();
+  cv::Mat blurred;
+  image.convertTo(blurred, CV_64F);
+  if (change.blur > 0) cv::GaussianBlur(blurred, blurred, cv::Size(), change.blur);
+  cv::Mat1d levels = blurred.reshape(1);
+  ChangeLight(levels, channels, change);
+  levels += change.offset;
+  if (change.noise > 0) AddNoise(levels, change.noise, seed);
   cv::Mat result;
-  changed.convertTo(result, change.quantise ? CV_8U : CV_32F);
+  levels.reshape(channels).convertTo(result, change.quantise ? CV_8U : CV_32F);
   return result;
 }
 

@@ -69,6 +69,12 @@ int main(int argc, char** argv) {
   stereo->add_option("--column", request.column, "name in the sweep")->required();
   stereo->add_option("--out", request.output, "CSV file to write")->required();
   stereo->add_option("--options-out", request.options_output, "YAML file for every parameter");
+  stereo->add_option("--window", request.window, "only this window of the sweep, px; 0 for all")
+      ->capture_default_str();
+  CLI::Option* changes = stereo->add_option("--changes", request.changes,
+                                            "YAML file with changes of the right images");
+  stereo->add_option("--change", request.change, "name in that file of the change to make")
+      ->needs(changes);
   stereo->add_option("--threads", request.threads, "threads; 0 for all cores")
       ->capture_default_str();
 

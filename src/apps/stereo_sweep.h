@@ -16,6 +16,9 @@ struct StereoSweepRequest {
   std::string column;          ///< name in the sweep
   std::string output;          ///< CSV file of scores
   std::string options_output;  ///< YAML file for every parameter; may be empty
+  std::string changes;         ///< YAML file with a map `changes`; may be empty
+  std::string change;          ///< name in it of what is done to right images; may be empty
+  int window = 0;              ///< px; the only one of the grid's that is run, 0: all
   int threads = 1;
 };
 

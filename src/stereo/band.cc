@@ -17,8 +17,8 @@
 #include <hwy/highway.h>
 
 #include <sgf/stereo/band.h>
+#include <sgf/stereo/row_winners-inl.h>
 #include <sgf/stereo/sgf_rows-inl.h>
-#include <sgf/stereo/winners-inl.h>
 
 HWY_BEFORE_NAMESPACE();
 namespace sgf::stereo::internal {
@@ -108,19 +108,15 @@ class BandMatcher {
         radius_(task.window / 2),
         stride_(stride),
         whole_(task.num_disparities / LanesOf<Sum>() * LanesOf<Sum>()),
-        finder_(task, stride),
-        right_view_(task, stride) {
+        winners_(task, stride) {
     const size_t row = static_cast<size_t>(task.width) * stride;
     ring_ = Filled<Cost>(task.window * row, 0);
     column_sums_ = Filled<Sum>((task.width + 2 * radius_ + 1) * static_cast<size_t>(stride), 0);
     // Columns run from -radius - 1 to width + radius - 1; those outside the image stay zero.
     column_zero_ = column_sums_.get() + static_cast<size_t>(radius_ + 1) * stride;
     full_reach_ = stride + task.min_disparity - radius_;
-    window_sums_ = Filled<Sum>(2 * kPixels * (static_cast<size_t>(stride) + 2 * kGuard), kMax);
     wanted_ = Filled<Sum>(stride, 0);
     std::fill_n(wanted_.get(), task.num_disparities, Sum{-1});
-    index_ = Filled<Sum>(stride, 0);
-    std::iota(index_.get(), index_.get() + stride, Sum{0});
   }
 
   void Run() {
@@ -142,21 +138,6 @@ class BandMatcher {
   using D = VectorTag<Sum>;
   using V = hn::Vec<D>;
   static constexpr Sum kMax = SumTraits<Sum>::kMax;
-  // kMax around every row of window sums: enough for a vector and the pixels of a block, and a
-  // multiple of any vector so that rows stay aligned.
-  static constexpr int kGuard = std::max<int>(64, 2 * HWY_MAX_BYTES / sizeof(Sum));
-
-  template <class T>
-  static hwy::AlignedFreeUniquePtr<T[]> Filled(size_t size, T value) {
-    auto values = hwy::AllocateAligned<T>(size);
-    std::fill_n(values.get(), size, value);
-    return values;
-  }
-
-  // The sums of pixel slot p, between guards; slots from kPixels on hold masked copies.
-  Sum* Window(int p) {
-    return window_sums_.get() + kGuard + static_cast<size_t>(p) * (stride_ + 2 * kGuard);
-  }
 
   // Adds the entering row's costs to a vector of column sums and takes the leaving row's off.
   template <bool kInside, bool kPadded, class Column>
@@ -195,13 +176,7 @@ class BandMatcher {
 
   // Disparity indices below this, in whole vectors, are candidates of some window that holds column
   // x; the column sums of the others are never looked at and stay zero.
-  int Reach(int x) const { return WholeVectors(x + radius_ - task_.min_disparity + 1); }
-
-  // A number of disparity indices rounded up to whole vectors: at least one, at most all.
-  int WholeVectors(int count) const {
-    if (count >= stride_) return stride_;
-    return static_cast<int>(hwy::RoundUpTo(std::max(1, count), LanesOf<Sum>()));
-  }
+  int Reach(int x) const { return winners_.WholeVectors(x + radius_ - task_.min_disparity + 1); }
 
   template <bool kInside>
   void EnterRow(int y) {
@@ -210,13 +185,13 @@ class BandMatcher {
       return;
     }
     StartWindows<kInside>();
-    if (right_view_.Enabled()) right_view_.StartRow();
+    winners_.StartRow();
     for (int x = 0; x < task_.width; x += kPixels) {
       const int count = std::min(kPixels, task_.width - x);
       SlideWindows<kInside>(x, count);
-      TakeWinners(x, y, count);
+      winners_.Take(x, y, count);
     }
-    if (right_view_.Enabled()) right_view_.Check((*task_.disparity)[y], Invalid());
+    winners_.EndRow(y);
   }
 
   // Window sums at x = -1, in the slot from which the first pixel slides on. The other slots start
@@ -225,11 +200,11 @@ class BandMatcher {
   void StartWindows() {
     const D d;
     for (int p = 0; p < kPixels; ++p) {
-      std::fill_n(Window(p), task_.num_disparities, SumTraits<Sum>::kOffset);
-      std::fill(Window(p) + task_.num_disparities, Window(p) + stride_, kMax);
-      std::fill_n(Window(kPixels + p), stride_, kMax);
+      Sum* sums = winners_.Slot(p);
+      std::fill_n(sums, task_.num_disparities, SumTraits<Sum>::kOffset);
+      std::fill(sums + task_.num_disparities, sums + stride_, kMax);
     }
-    Sum* window = Window(kPixels - 1);
+    Sum* window = winners_.Slot(kPixels - 1);
     for (int x = 0; x < radius_; ++x)
       EnterColumn<kInside>(x, [&](int k, V sums) HWY_ATTR {
         hn::Store(hn::Add(hn::Load(d, window + k), sums), d, window + k);
@@ -240,8 +215,8 @@ class BandMatcher {
   template <bool kInside>
   HWY_INLINE void SlideWindows(int x, int count) {
     const D d;
-    const Sum* previous = Window(kPixels - 1);
-    Sum* window = Window(0);
+    const Sum* previous = winners_.Slot(kPixels - 1);
+    Sum* window = winners_.Slot(0);
     const Sum* leaving = column_zero_ + static_cast<ptrdiff_t>(x - radius_ - 1) * stride_;
     for (int p = 0; p < count; ++p) {
       auto least = hn::Set(d, kMax);
@@ -251,85 +226,21 @@ class BandMatcher {
         hn::Store(sum, d, window + k);
         least = hn::Min(least, sum);
       });
-      hn::Store(least, d, finder_.Least(p));
+      hn::Store(least, d, winners_.Least(p));
       previous = window;
-      window += stride_ + 2 * kGuard;
+      window += winners_.SlotStride();
       leaving += stride_;
     }
   }
-
-  // The sums of `count` pixels from x on over their candidates. All slots are set.
-  // @param[out] end all candidates lie below this index, in whole vectors.
-  HWY_INLINE std::array<const Sum*, kPixels> Candidates(int x, int count, int& end) {
-    std::array<const Sum*, kPixels> sums;
-    for (int p = 0; p < kPixels; ++p) sums[p] = Window(p);
-    end = stride_;
-    if (x < task_.num_disparities - 1 + task_.min_disparity ||
-        x + count > task_.width + task_.min_disparity) {
-      end = WholeVectors(x + count - task_.min_disparity);
-      for (int p = 0; p < count; ++p) sums[p] = MaskedCopy(x + p, p, end);
-    }
-    return sums;
-  }
-
-  // The sums of pixel x with those kMax whose disparity leaves the right image, and their least. A
-  // copy up to index `copied`, since the window sums themselves slide on.
-  const Sum* MaskedCopy(int x, int p, int copied) {
-    const int first = std::max(0, x - task_.min_disparity - (task_.width - 1));
-    const int end = std::min(task_.num_disparities, x - task_.min_disparity + 1);
-    const D d;
-    const auto none = hn::Set(d, kMax);
-    const auto low = hn::Set(d, static_cast<Sum>(first));
-    const auto high = hn::Set(d, static_cast<Sum>(std::max(end, 0) - 1));
-    Sum* copy = Window(kPixels + p);
-    auto least = none;
-    for (int k = 0; k < copied; k += LanesOf<Sum>()) {
-      const auto index = hn::Load(d, index_.get() + k);
-      const auto out = hn::Or(hn::Gt(low, index), hn::Gt(index, high));
-      const auto sums = hn::IfThenElse(out, none, hn::Load(d, Window(p) + k));
-      hn::Store(sums, d, copy + k);
-      least = hn::Min(least, sums);
-    }
-    hn::Store(least, d, finder_.Least(p));
-    return copy;
-  }
-
-  void TakeWinners(int x, int y, int count) {
-    int end;
-    const std::array<const Sum*, kPixels> sums = Candidates(x, count, end);
-    Winners<Sum> winners;
-    finder_.Find(sums, count, end, winners);
-    int16_t* disparity = (*task_.disparity)[y] + x;
-    for (int p = 0; p < count; ++p)
-      disparity[p] = winners.accepted[p]
-                         ? static_cast<int16_t>(16 * task_.min_disparity + winners.sixteenths[p])
-                         : Invalid();
-    if (right_view_.Enabled()) right_view_.Add(x, count, sums, winners);
-    if (task_.best)
-      for (int p = 0; p < count; ++p)
-        if (winners.accepted[p]) KeepCosts(x + p, y, sums[p], winners.index[p]);
-  }
-
-  // The winner's sum and the least one that is neither its own nor a neighbour's.
-  void KeepCosts(int x, int y, const Sum* sums, int index) {
-    Sum second = kMax;
-    for (int k = 0; k < task_.num_disparities; ++k)
-      if (std::abs(k - index) > 1) second = std::min(second, sums[k]);
-    (*task_.best)(y, x) = sums[index] - SumTraits<Sum>::kOffset;
-    (*task_.second)(y, x) = second == kMax ? kNoSecond : second - SumTraits<Sum>::kOffset;
-  }
-
-  int16_t Invalid() const { return static_cast<int16_t>(16 * (task_.min_disparity - 1)); }
 
   const BandTask& task_;
   Source& source_;
   int radius_, stride_;
   int whole_;       // disparity indices in vectors that hold no padding
   int full_reach_;  // first column all of whose sums are needed
-  WinnerFinder<Sum> finder_;
-  RightView<Sum> right_view_;
+  RowWinners<Sum> winners_;
   hwy::AlignedFreeUniquePtr<Cost[]> ring_;
-  hwy::AlignedFreeUniquePtr<Sum[]> column_sums_, window_sums_, wanted_, index_;
+  hwy::AlignedFreeUniquePtr<Sum[]> column_sums_, wanted_;
   Cost* ring_row_ = nullptr;
   Sum* column_zero_;
 };

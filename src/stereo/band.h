@@ -2,6 +2,7 @@
 
 // Internal to sgf::stereo: what the row kernels of band.cc work on.
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -10,10 +11,23 @@
 #include <opencv2/core.hpp>
 
 #include <sgf/core/gradient.h>
-#include <sgf/stereo/block_matcher.h>
+#include <sgf/core/parallel.h>
+#include <sgf/stereo/matches.h>
 #include <sgf/stereo/sgf_image.h>
 
 namespace sgf::stereo::internal {
+
+/// Runs body(y_begin, y_end) on bands that make up rows [begin, end): one a thread, but none of
+/// fewer than `least_rows` unless it is the only one.
+template <class Body>
+void ForEachBand(int begin, int end, int least_rows, int threads, const Body& body) {
+  const int count = ResolveThreads(threads), rows = end - begin;
+  const int bands = std::min(count, std::max(1, rows / least_rows));
+  ParallelFor(bands, count, [&](int i) {
+    body(begin + static_cast<int>(int64_t{rows} * i / bands),
+         begin + static_cast<int>(int64_t{rows} * (i + 1) / bands));
+  });
+}
 
 /// One band of output rows and what is wanted of them.
 struct BandTask {

@@ -1,15 +1,9 @@
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
-#include <numeric>
 
 #include <fmt/core.h>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <sgf/core/error.h>
-#include <sgf/core/parallel.h>
 #include <sgf/stereo/band.h>
 #include <sgf/stereo/block_matcher.h>
 #include <sgf/stereo/cost_rows.h>
@@ -22,8 +16,7 @@ namespace {
 using internal::BandTask;
 using internal::SgfImage;
 
-constexpr int kLargestUniqueness = 99;  // percent; less than the winner itself
-constexpr int kLargestWindow = 51;      // at which 16 bits still hold sums of costs of 20 levels
+constexpr int kLargestWindow = 51;  // at which 16 bits still hold sums of costs of 20 levels
 
 }  // namespace
 
@@ -31,7 +24,7 @@ void CheckOptions(const BlockMatcherOptions& o) {
   CheckCostOptions(o);
   RequireRange("window", o.window, 1, kLargestWindow);
   RequireOdd("window", o.window);
-  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, kLargestUniqueness);
+  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, internal::kLargestUniqueness);
   RequireRange("texture_threshold", o.texture_threshold, 0, 1e6);
   RequireRange("left_right_max", o.left_right_max, -1, kLargestDisparity);
   RequireRange("speckle_window", o.speckle_window, 0, 1e9);
@@ -47,17 +40,13 @@ void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOpti
 
 namespace {
 
-int UniquenessQ16(double percent) { return static_cast<int>(std::lround(percent / 100 * 65536)); }
-
 // Runs `match_band` on bands of rows. Sums are exact, so the split does not show in the result.
 template <class MatchBand>
-void ForEachBand(const BandTask& whole, int threads, const MatchBand& match_band) {
-  const int count = ResolveThreads(threads);
-  const int bands = std::min(count, std::max(1, whole.height / (2 * whole.window)));
-  ParallelFor(bands, count, [&](int i) {
+void MatchBands(const BandTask& whole, int threads, const MatchBand& match_band) {
+  internal::ForEachBand(0, whole.height, 2 * whole.window, threads, [&](int begin, int end) {
     BandTask band = whole;
-    band.y_begin = static_cast<int>(int64_t{whole.height} * i / bands);
-    band.y_end = static_cast<int>(int64_t{whole.height} * (i + 1) / bands);
+    band.y_begin = begin;
+    band.y_end = end;
     match_band(band);
   });
 }
@@ -67,13 +56,13 @@ void RunBands(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptio
   if (options.metric == "sgf") {
     const SgfImage l = internal::PrepareSgf(left, options);
     const SgfImage r = internal::PrepareSgf(right, options);
-    ForEachBand(task, options.threads,
-                [&](const BandTask& band) { internal::MatchSgfBand(band, l, r); });
+    MatchBands(task, options.threads,
+               [&](const BandTask& band) { internal::MatchSgfBand(band, l, r); });
     return;
   }
   const auto factory = internal::PrepareCostRows(left, right, options, options.window);
   task.window = factory.window;
-  ForEachBand(task, options.threads, [&](const BandTask& band) {
+  MatchBands(task, options.threads, [&](const BandTask& band) {
     const auto rows = factory.make();
     internal::MatchCostBand(band, *rows);
   });
@@ -90,14 +79,6 @@ cv::Mat1f Texture(const cv::Mat& image, const BlockMatcherOptions& options) {
 }
 
 }  // namespace
-
-std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel) {
-  static constexpr std::array<std::pair<const char*, Subpixel>, 3> kNames{
-      {{"none", Subpixel::kNone},
-       {"equiangular", Subpixel::kEquiangular},
-       {"parabola", Subpixel::kParabola}}};
-  return kNames;
-}
 
 BlockMatcher::BlockMatcher(BlockMatcherOptions options) : options_(std::move(options)) {
   CheckOptions(options_);
@@ -117,7 +98,7 @@ void BlockMatcher::Compute(const cv::Mat& left, const cv::Mat& right, cv::Mat1s&
   CheckPair(left, right, options_);
   disparity.create(left.size());
   BandTask task = MakeTask(options_, disparity);
-  task.uniqueness_q16 = UniquenessQ16(options_.uniqueness_pct);
+  task.uniqueness_q16 = internal::UniquenessQ16(options_.uniqueness_pct);
   RunBands(ApplyPrefilter(left, options_), ApplyPrefilter(right, options_), options_, task);
   DropTexturelessAndSpeckles(left, disparity);
 }
@@ -137,14 +118,7 @@ Matches BlockMatcher::Match(const cv::Mat& left, const cv::Mat& right) const {
 
 cv::Mat1s BlockMatcher::Filter(const Matches& matches, const cv::Mat& left,
                                double uniqueness_pct) const {
-  RequireRange("uniqueness_pct", uniqueness_pct, 0, kLargestUniqueness);
-  cv::Mat1s disparity = matches.disparity.clone();
-  const int64_t q16 = UniquenessQ16(uniqueness_pct);
-  const auto close = [q16](int best, int second) { return second <= best + ((best * q16) >> 16); };
-  if (q16 > 0)
-    for (int y = 0; y < disparity.rows; ++y)
-      for (int x = 0; x < disparity.cols; ++x)
-        if (close(matches.best(y, x), matches.second(y, x))) disparity(y, x) = InvalidDisparity();
+  cv::Mat1s disparity = internal::UniqueDisparities(matches, uniqueness_pct, InvalidDisparity());
   DropTexturelessAndSpeckles(left, disparity);
   return disparity;
 }
@@ -152,16 +126,12 @@ cv::Mat1s BlockMatcher::Filter(const Matches& matches, const cv::Mat& left,
 void BlockMatcher::DropTexturelessAndSpeckles(const cv::Mat& left, cv::Mat1s& disparity) const {
   if (options_.texture_threshold > 0)
     disparity.setTo(InvalidDisparity(), Texture(left, options_) < options_.texture_threshold);
-  if (options_.speckle_window > 0)
-    cv::filterSpeckles(disparity, InvalidDisparity(), options_.speckle_window,
-                       static_cast<int>(16 * options_.speckle_range));
+  internal::DropSpeckles(disparity, InvalidDisparity(), options_.speckle_window,
+                         options_.speckle_range);
 }
 
 cv::Mat1f BlockMatcher::ToFloat(const cv::Mat1s& disparity) const {
-  cv::Mat1f result;
-  disparity.convertTo(result, CV_32F, 1.0 / 16);
-  result.setTo(std::numeric_limits<float>::quiet_NaN(), disparity == InvalidDisparity());
-  return result;
+  return internal::ToFloat(disparity, InvalidDisparity());
 }
 
 }  // namespace sgf::stereo

@@ -1,21 +1,11 @@
 #pragma once
 
-#include <span>
-#include <utility>
-
 #include <opencv2/core.hpp>
 
 #include <sgf/stereo/cost_options.h>
+#include <sgf/stereo/matches.h>
 
 namespace sgf::stereo {
-
-/// Curve through the winner's cost and its two neighbours whose minimum is the sub-pixel disparity.
-enum class Subpixel {
-  kNone,
-  kEquiangular,  ///< two lines of opposite slope (as cv::StereoBM)
-  kParabola,
-};
-std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel);
 
 /// Parameters of BlockMatcher. Where a default has a counterpart in cv::StereoBM, it is named.
 struct BlockMatcherOptions : CostOptions {
@@ -53,14 +43,6 @@ void CheckOptions(const BlockMatcherOptions& options);
 /// @throws Error for two images that do not fit each other or the options.
 void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options);
 
-/// Disparities of the left image in 1/16 px, as cv::StereoBM gives them, with what the filters that
-/// drop matches need.
-struct Matches {
-  cv::Mat1s disparity;  ///< 16 * disparity; InvalidDisparity() where there is no match
-  cv::Mat1i best;       ///< window cost of the winner, in the matcher's integer units
-  cv::Mat1i second;     ///< least window cost outside the winner and its two neighbours
-};
-
 /// Local stereo matching of rectified images: window sums of a dissimilarity, winner-take-all over
 /// the disparities, sub-pixel interpolation and checks (eqs. 16, 17 of the paper). Works row by
 /// row: memory grows with width * disparities * window, never with height * disparities.
@@ -78,7 +60,7 @@ class BlockMatcher {
   const BlockMatcherOptions& options() const { return options_; }
 
   /// The marker of pixels without a match: 16 * (min_disparity - 1), as in OpenCV.
-  short InvalidDisparity() const { return static_cast<short>(16 * (options_.min_disparity - 1)); }
+  short InvalidDisparity() const { return internal::InvalidDisparity(options_.min_disparity); }
 
   /// Matches two rectified images of equal size and type (one channel; 8-bit, 16-bit or float).
   /// @param[out] disparity 16 * disparity, InvalidDisparity() where a check dropped the match; its

@@ -11,6 +11,7 @@
 #include <sgf/core/error.h>
 #include <sgf/metrics/registry.h>
 #include <sgf/metrics/sample_image.h>
+#include <sgf/stereo/byte_scale.h>
 #include <sgf/stereo/cost_rows.h>
 #include <sgf/stereo/sgf_image.h>
 
@@ -348,19 +349,11 @@ ByteCostRows::ByteCostRows(const CostRowsFactory& factory, uint32_t scale_q16, i
       scale_q16_(scale_q16),
       width_(width),
       num_disparities_(num_disparities),
-      limit_(std::min(65535U, (256U << 16) / std::max(1U, scale_q16))),
       row_(static_cast<size_t>(width) * num_disparities) {}
 
 void ByteCostRows::Row(int y, int stride, uint8_t* costs) {
   rows_->Row(y, num_disparities_, row_.data());
-  const uint32_t largest = 255, half = 1U << 15;
-  const uint16_t* from = row_.data();
-  for (int x = 0; x < width_; ++x, costs += stride, from += num_disparities_)
-    for (int d = 0; d < num_disparities_; ++d) {
-      // The product fits 32 bits because costs are cut where it passes 256 anyway.
-      const uint32_t cost = std::min<uint32_t>(from[d], limit_);
-      costs[d] = static_cast<uint8_t>(std::min((cost * scale_q16_ + half) >> 16, largest));
-    }
+  ScaleToBytes(row_.data(), width_, num_disparities_, scale_q16_, stride, costs);
 }
 
 }  // namespace sgf::stereo::internal

@@ -51,7 +51,6 @@ class ByteCostRows {
   std::unique_ptr<CostRows> rows_;
   uint32_t scale_q16_;
   int width_, num_disparities_;
-  uint32_t limit_;
   std::vector<uint16_t> row_;
 };
 

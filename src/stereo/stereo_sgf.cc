@@ -1,53 +1,76 @@
-#include <sgf/core/error.h>
 #include <sgf/stereo/block_matcher.h>
+#include <sgf/stereo/mesh_stereo.h>
+#include <sgf/stereo/opencv_matcher.h>
+#include <sgf/stereo/semi_global.h>
 #include <sgf/stereo/stereo_sgf.h>
 
 namespace sgf {
 namespace {
 
-class StereoSgfImpl final : public StereoSgf {
+class StereoSgfImpl final
+    : public stereo::OpenCvMatcher<StereoSgf, stereo::BlockMatcher, stereo::BlockMatcherOptions> {
  public:
-  explicit StereoSgfImpl(const stereo::BlockMatcherOptions& options) : options_(options) {}
+  using OpenCvMatcher::OpenCvMatcher;
 
-  void compute(cv::InputArray left, cv::InputArray right, cv::OutputArray disparity) override {
-    const stereo::BlockMatcher matcher(options_);
-    disparity.create(left.size(), CV_16S);
-    cv::Mat1s result = disparity.getMat();
-    matcher.Compute(left.getMat(), right.getMat(), result);
-  }
-
-  int getMinDisparity() const override { return options_.min_disparity; }
-  void setMinDisparity(int value) override { options_.min_disparity = value; }
-  int getNumDisparities() const override { return options_.num_disparities; }
-  void setNumDisparities(int value) override { options_.num_disparities = value; }
-  int getBlockSize() const override { return options_.window; }
-  void setBlockSize(int value) override { options_.window = value; }
-  int getSpeckleWindowSize() const override { return options_.speckle_window; }
-  void setSpeckleWindowSize(int value) override { options_.speckle_window = value; }
-  int getSpeckleRange() const override { return static_cast<int>(options_.speckle_range); }
-  void setSpeckleRange(int value) override { options_.speckle_range = value; }
-  int getDisp12MaxDiff() const override { return options_.left_right_max; }
-  void setDisp12MaxDiff(int value) override { options_.left_right_max = value; }
   int getUniquenessRatio() const override { return static_cast<int>(options_.uniqueness_pct); }
   void setUniquenessRatio(int percent) override { options_.uniqueness_pct = percent; }
   double getTextureThreshold() const override { return options_.texture_threshold; }
   void setTextureThreshold(double threshold) override { options_.texture_threshold = threshold; }
   int getThreads() const override { return options_.threads; }
   void setThreads(int threads) override { options_.threads = threads; }
-
- private:
-  stereo::BlockMatcherOptions options_;
 };
+
+class StereoSgfSemiGlobalImpl final
+    : public stereo::OpenCvMatcher<StereoSgfSemiGlobal, stereo::SemiGlobal,
+                                   stereo::SemiGlobalOptions> {
+ public:
+  using OpenCvMatcher::OpenCvMatcher;
+
+  int getP1() const override { return options_.p1; }
+  void setP1(int penalty) override { options_.p1 = penalty; }
+  int getP2() const override { return options_.p2; }
+  void setP2(int penalty) override { options_.p2 = penalty; }
+  int getUniquenessRatio() const override { return static_cast<int>(options_.uniqueness_pct); }
+  void setUniquenessRatio(int percent) override { options_.uniqueness_pct = percent; }
+  int getThreads() const override { return options_.threads; }
+  void setThreads(int threads) override { options_.threads = threads; }
+};
+
+class StereoSgfMeshImpl final
+    : public stereo::OpenCvMatcher<StereoSgfMesh, stereo::MeshStereo, stereo::MeshStereoOptions> {
+ public:
+  using OpenCvMatcher::OpenCvMatcher;
+
+  int getSeed() const override { return options_.seed; }
+  void setSeed(int seed) override { options_.seed = seed; }
+  int getThreads() const override { return options_.threads; }
+  void setThreads(int threads) override { options_.threads = threads; }
+};
+
+// The options of create(), checked.
+template <class Matcher, class Options>
+Options CheckedOptions(Options options, int num_disparities, int block_size) {
+  if (num_disparities != 0) options.num_disparities = num_disparities;
+  options.window = block_size;
+  options.threads = 0;
+  return Matcher(options).options();
+}
 
 }  // namespace
 
 cv::Ptr<StereoSgf> StereoSgf::create(int num_disparities, int block_size) {
-  stereo::BlockMatcherOptions options;
-  if (num_disparities != 0) options.num_disparities = num_disparities;
-  options.window = block_size;
-  options.threads = 0;
-  stereo::BlockMatcher validated(options);
-  return cv::makePtr<StereoSgfImpl>(validated.options());
+  return cv::makePtr<StereoSgfImpl>(CheckedOptions<stereo::BlockMatcher>(
+      stereo::BlockMatcherOptions{}, num_disparities, block_size));
+}
+
+cv::Ptr<StereoSgfSemiGlobal> StereoSgfSemiGlobal::create(int num_disparities, int block_size) {
+  return cv::makePtr<StereoSgfSemiGlobalImpl>(
+      CheckedOptions<stereo::SemiGlobal>(stereo::SemiGlobalOptions{}, num_disparities, block_size));
+}
+
+cv::Ptr<StereoSgfMesh> StereoSgfMesh::create(int num_disparities, int block_size) {
+  return cv::makePtr<StereoSgfMeshImpl>(
+      CheckedOptions<stereo::MeshStereo>(stereo::MeshStereoOptions{}, num_disparities, block_size));
 }
 
 }  // namespace sgf

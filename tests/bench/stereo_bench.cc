@@ -1,5 +1,6 @@
-// Throughput of block matching on sgf, gradients included, against cv::StereoBM with its prefilter:
-// the same pair, disparities, window and filters (uniqueness only).
+// Throughput of block matching on sgf, gradients included, against cv::StereoBM with its prefilter
+// (the same pair, disparities, window and filters: uniqueness only), and of semi-global matching
+// on sgf, eight directions, against cv::StereoSGBM, five (window 5, uniqueness, left-right check).
 //
 // SGF_BENCH_PAIR names a folder with im0.png and im1.png. Benchmarks are called
 // case/implementation/isa/threads; mde_per_s is width * height * disparities / 10^6 a second,
@@ -29,6 +30,7 @@ namespace sgf {
 namespace {
 
 constexpr int kWindow = 9;
+constexpr int kSemiGlobalWindow = 5;
 constexpr int kUniqueness = 15;  // OpenCV's default
 
 struct Case {
@@ -76,16 +78,29 @@ void Measure(benchmark::State& state, const Case& c, const std::function<void()>
       evaluations * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
 
+void Measure(benchmark::State& state, const Case& c, cv::StereoMatcher& matcher) {
+  Measure(state, c, [&] {
+    cv::Mat disparity;
+    matcher.compute(c.left, c.right, disparity);
+    benchmark::DoNotOptimize(disparity.data);
+  });
+}
+
 void OpenCvBm(benchmark::State& state, const Case& c, int threads) {
   cv::setNumThreads(threads);
   const auto matcher = cv::StereoBM::create(c.disparities, kWindow);
   matcher->setTextureThreshold(0);
   matcher->setUniquenessRatio(kUniqueness);
-  Measure(state, c, [&] {
-    cv::Mat disparity;
-    matcher->compute(c.left, c.right, disparity);
-    benchmark::DoNotOptimize(disparity.data);
-  });
+  Measure(state, c, *matcher);
+}
+
+void OpenCvSgbm(benchmark::State& state, const Case& c, int threads) {
+  cv::setNumThreads(threads);
+  // Penalties as OpenCV's documentation proposes for one channel: 8 and 32 a pixel of the window.
+  constexpr int kArea = kSemiGlobalWindow * kSemiGlobalWindow;
+  const auto matcher = cv::StereoSGBM::create(0, c.disparities, kSemiGlobalWindow, 8 * kArea,
+                                              32 * kArea, 1, 63, kUniqueness);
+  Measure(state, c, *matcher);
 }
 
 void SgfBm(benchmark::State& state, const Case& c, const std::string& isa, int threads) {
@@ -95,11 +110,17 @@ void SgfBm(benchmark::State& state, const Case& c, const std::string& isa, int t
   matcher->setUniquenessRatio(kUniqueness);
   matcher->setDisp12MaxDiff(-1);
   matcher->setThreads(threads);
-  Measure(state, c, [&] {
-    cv::Mat disparity;
-    matcher->compute(c.left, c.right, disparity);
-    benchmark::DoNotOptimize(disparity.data);
-  });
+  Measure(state, c, *matcher);
+  RestrictSimd("");
+}
+
+void SgfSgm(benchmark::State& state, const Case& c, const std::string& isa, int threads) {
+  cv::setNumThreads(1);
+  RestrictSimd(isa);
+  const auto matcher = StereoSgfSemiGlobal::create(c.disparities, kSemiGlobalWindow);
+  matcher->setUniquenessRatio(kUniqueness);
+  matcher->setThreads(threads);
+  Measure(state, c, *matcher);
   RestrictSimd("");
 }
 
@@ -110,18 +131,28 @@ void Register(const Case& c, const char* implementation, const std::string& isa,
   benchmark::RegisterBenchmark(name.c_str(), run)->Unit(benchmark::kMillisecond)->UseRealTime();
 }
 
-void RegisterCase(const Case& c) {
+using OpenCvMatcher = void (*)(benchmark::State&, const Case&, int threads);
+using SgfMatcher = void (*)(benchmark::State&, const Case&, const std::string& isa, int threads);
+
+// OpenCV's implementation and ours, on one thread and two and on every instruction set.
+void RegisterPair(const Case& c, const char* opencv_name, OpenCvMatcher opencv,
+                  const char* sgf_name, SgfMatcher sgf) {
   for (const int threads : {1, 2})
-    Register(c, "opencv_bm", "own", threads,
-             [&c, threads](benchmark::State& state) { OpenCvBm(state, c, threads); });
+    Register(c, opencv_name, "own", threads,
+             [=, &c](benchmark::State& state) { opencv(state, c, threads); });
   const auto targets = SimdTargets();
   for (const std::string& isa : targets) {
     if (isa == "scalar") continue;
     for (const int threads : {1, 2})
       if (threads == 1 || isa == targets.front())
-        Register(c, "sgf_bm", isa, threads,
-                 [&c, isa, threads](benchmark::State& state) { SgfBm(state, c, isa, threads); });
+        Register(c, sgf_name, isa, threads,
+                 [=, &c](benchmark::State& state) { sgf(state, c, isa, threads); });
   }
+}
+
+void RegisterCase(const Case& c) {
+  RegisterPair(c, "opencv_bm", OpenCvBm, "sgf_bm", SgfBm);
+  RegisterPair(c, "opencv_sgbm", OpenCvSgbm, "sgf_sgm", SgfSgm);
 }
 
 int Run(int argc, char** argv) {

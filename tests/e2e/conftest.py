@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from PIL import Image
 
 HERE = Path(__file__).resolve().parent
@@ -24,6 +25,18 @@ def write_pair(folder):
     truth = np.linspace(1, 9, 600, dtype="<f4").tobytes()
     (folder / "disp0GT.pfm").write_bytes(b"Pf\n30 20\n-1\n" + truth)
     (folder / "calib.txt").write_text("width=30\nheight=20\nndisp=16\n")
+
+
+def main_columns(sweep):
+    """The paper's columns of a sweep's YAML map."""
+    return {name: node for name, node in sweep["columns"].items() if not node.get("extra", False)}
+
+
+def drop_extra_columns(file):
+    """Keeps the paper's columns of a sweep: enough to see what is made, and sooner made."""
+    sweep = yaml.safe_load(file.read_text())
+    sweep["columns"] = main_columns(sweep)
+    file.write_text(yaml.safe_dump(sweep, default_flow_style=None, sort_keys=False))
 
 
 class Project:
@@ -45,6 +58,10 @@ class Project:
             shutil.copytree(PROJECT / folder, self.root / folder, ignore=ignore)
         for file in ("reproduce.sh", "packages.apt"):
             shutil.copy2(PROJECT / file, self.root / file)
+        for sweep in (self.root / "paper" / "sweeps").iterdir():
+            drop_extra_columns(sweep)
+        light_change = self.root / "paper" / "experiments" / "light_change.yaml"
+        light_change.write_text(light_change.read_text().replace(", census]", "]"))
 
     def environment(self, **more):
         kept = {k: v for k, v in os.environ.items() if not k.startswith("SGF_")}
@@ -77,7 +94,7 @@ class Project:
         return process.returncode, output
 
     def calls(self):
-        """`data set column` for each column that the stand-in for sgf_eval has scored."""
+        """`data set sweep/column` for each column that the stand-in for sgf_eval has scored."""
         file = self.bin / "calls"
         return file.read_text().splitlines() if file.exists() else []
 
@@ -87,7 +104,7 @@ class Project:
         return file.read_text().splitlines() if file.exists() else []
 
     def fail(self, what):
-        """Has a column of sgf_eval or a command of sgf_render fail; None: no more."""
+        """Has a column `sweep/column` of sgf_eval or a command of sgf_render fail; None: no more."""
         self.bin.mkdir(parents=True, exist_ok=True)
         (self.bin / "fail").write_text(what or "")
 

@@ -57,6 +57,7 @@ def test_help_and_list_need_nothing_built(project):
         (["--data"], "--data needs a folder"),
         (["--data", "/nonexistent/data"], "data folder '/nonexistent/data' does not exist"),
         (["test", "--only", "table1"], "does not go with test"),
+        (["--sanitize"], "--sanitize goes with test only"),
     ],
 )
 def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, message):
@@ -131,6 +132,15 @@ def test_the_test_command_builds_all_and_ends_with_ctests_summary(project):
     assert "--target" not in log
     assert f"ctest --preset release --parallel 3 SGF_DATA={project.data}" in log
     assert output.splitlines()[-1] == "100% tests passed, 0 tests failed out of 3"
+
+
+def test_the_sanitizers_have_a_build_of_their_own(project):
+    code, output = project.run("test", "--sanitize", "--jobs", "3")
+    assert code == 0 and f"built in {project.root}/build/sanitize" in output
+    log = project.stub_log()
+    assert "cmake --preset sanitize" in log and "cmake --build --preset sanitize" in log
+    assert "ctest --preset sanitize --parallel 3" in log
+    assert "preset release" not in log and "--target" not in log
 
 
 def test_a_run_builds_only_the_programs_and_keeps_a_developers_tests(project):

@@ -6,14 +6,15 @@ import shutil
 import pytest
 import yaml
 
-from conftest import PROJECT
+from conftest import PROJECT, main_columns
 
-SWEEP = yaml.safe_load((PROJECT / "paper" / "sweeps" / "stereo_bm.yaml").read_text())
-COLUMNS = list(SWEEP["columns"])
+SWEEPS = [yaml.safe_load(path.read_text()) for path in (PROJECT / "paper" / "sweeps").glob("*.yaml")]
+COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_columns(sweep)]
+CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 RENDERED = ["fig1", "fig2", "fig3", "scenes", "sequences"]  # these need no data set
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
-PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5"]
+PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
     "tables": [
         f"{table}{end}"
@@ -22,7 +23,7 @@ FILES = {
     ]
     + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
-    + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md"],
+    + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
 
@@ -43,13 +44,18 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     code, output = project.run("--jobs", "2")
     assert code == 0, output
     assert made(project) == {folder: sorted(names) for folder, names in FILES.items()}
-    assert sorted(project.calls()) == sorted(f"debian_pairs {column}" for column in COLUMNS)
+    calls = sorted(f"debian_pairs {column}" for column in [*COLUMNS, *CHANGED])
+    assert sorted(project.calls()) == calls
     renderings = project.renderings()
     assert renderings.count("pair") == renderings.count("sequence") == 1
     summary = output[output.index("== summary") :]
     assert "table1         made        tables/table1.md" in summary
-    assert "debian_pairs all, 2 scenes, mean px: sgf" in summary
-    assert "motorcycle_741x500: sgf 2.29 times cv::StereoBM (avx3, 1 thread)" in summary
+    assert "debian_pairs all, 2 scenes, StereoBM, mean px: sgf" in summary
+    # the stand-in doubles errors under a change
+    for where in ("StereoBM, rise of mean px: sgf +1.45", "MeshStereo, rise of mean px: sgf +3.67"):
+        assert f"debian_pairs all, encoded, {where}, pm" in summary
+    assert "motorcycle_741x500: sgf_bm 2.29 times cv::StereoBM (avx3, 1 thread)" in summary
+    assert "motorcycle_741x500: sgf_sgm 1.20 times cv::StereoSGBM (avx3, 1 thread)" in summary
     assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
     assert "checked, kept, median / 90th percentile of depth errors: sad 60 %, 1.0 / 20.0 cm" in summary
     assert "sequences      made        figures/sequences.png (.pdf), tables/sequences.md" in summary
@@ -59,7 +65,7 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     code, output = project.run()
     assert code == 0
     assert output.count("up to date") == len(EXPERIMENTS) and " made " not in output
-    assert len(project.calls()) == len(COLUMNS) and project.renderings() == renderings
+    assert len(project.calls()) == len(calls) and project.renderings() == renderings
     unchanged = [p for p, t in times.items() if p.stat().st_mtime_ns == t and "logs" not in str(p)]
     assert len(unchanged) >= sum(map(len, FILES.values()))
 
@@ -76,7 +82,8 @@ def test_progress_counts_to_the_end(project):
 def test_tables_of_the_real_script_hold_the_stand_ins_scores(project):
     project.run("--only", "table1")
     table = rows(project.results / "tables" / "table1.csv")
-    sgf = [row for row in table if row["cost"] == "sgf" and row["dataset"] == "debian_pairs"]
+    wanted = ("debian_pairs", "stereo_bm", "sgf")
+    sgf = [row for row in table if (row["dataset"], row["matcher"], row["cost"]) == wanted]
     values = {(row["region"], row["quantity"]): row for row in sgf}
     # the stand-in at window 9, uniqueness 10: invalid 31, mean 1.38 and 1.518
     assert values["all", "invalid_pct"]["measured"] == "31.0000"
@@ -100,7 +107,11 @@ def test_downloaded_data_are_added_without_repeating_the_rest(project):
     table = rows(project.results / "tables" / "table2.csv")
     wanted = ("kitti2015", "sgf", "mean_px")
     sgf = [r for r in table if (r["dataset"], r["cost"], r["quantity"]) == wanted]
-    assert [(r["region"], r["published"], r["scenes"]) for r in sgf] == [("noc", "1.61", "2")]
+    assert [(r["matcher"], r["region"], r["published"], r["scenes"]) for r in sgf] == [
+        ("stereo_bm", "noc", "1.61", "2"),
+        ("stereo_mesh", "noc", "2.02", "2"),
+        ("stereo_sgm", "noc", "", "2"),
+    ]
     assert "middlebury2014_q" in output[output.index("Data sets absent") :]
     assert "kitti2015" not in output[output.index("Data sets absent") :]
 
@@ -110,11 +121,11 @@ def test_new_scenes_and_another_folder_are_scored_anew(project):
     project.run("--only", "table2", SGF_DATA=str(project.data))
     project.add_dataset("kitti2015", ["000001"])
     project.run("--only", "table2", SGF_DATA=str(project.data))
-    assert project.calls().count("kitti2015 sgf") == 2
+    assert project.calls().count("kitti2015 stereo_bm/sgf") == 2
     moved = project.data.rename(project.data.parent / "moved")
     project.run("--only", "table2", "--data", str(moved))
-    assert project.calls().count("kitti2015 sgf") == 3
-    assert project.calls().count("debian_pairs sgf") == 1
+    assert project.calls().count("kitti2015 stereo_bm/sgf") == 3
+    assert project.calls().count("debian_pairs stereo_bm/sgf") == 1
 
 
 def test_a_changed_program_makes_its_results_anew(project):
@@ -134,20 +145,22 @@ def test_a_changed_sweep_or_table_makes_what_depends_on_it_anew(project):
     _, output = project.run("--only", "table1")
     assert "table1         made" in output and len(project.calls()) == len(COLUMNS)
     scenes = rows(project.results / "tables" / "table1_scenes.csv")
-    assert {row["window"] for row in scenes} == {"11"}
+    windows = {row["matcher"]: row["window"] for row in scenes}
+    assert windows == {"stereo_bm": "11", "stereo_mesh": "35", "stereo_sgm": "5"}
     sweep = project.root / "paper" / "sweeps" / "stereo_bm.yaml"
     sweep.write_text(sweep.read_text().replace("[5, 7,", "[7,"))
     project.run("--only", "table1")
-    assert len(project.calls()) == 2 * len(COLUMNS)
+    again = [column for column in COLUMNS if column.startswith("stereo_bm/")]
+    assert len(project.calls()) == len(COLUMNS) + len(again)
 
 
 def test_a_failing_job_names_its_log_and_leaves_the_rest_standing(project):
-    project.fail("pm")
+    project.fail("stereo_bm/pm")
     code, output = project.run("--only", "table1", "fig4")
     log = project.results / "logs" / "scores_stereo_bm_debian_pairs_pm.log"
     assert code == 1
     assert f"FAILED scores: raw/stereo_bm/debian_pairs/pm.csv; log: {log}" in output
-    assert "| sgf_eval: column pm was told to fail" in output
+    assert "| sgf_eval: column stereo_bm/pm was told to fail" in output
     assert "table1         NOT MADE" in output and "fig4           made" in output
     assert len(project.calls()) == len(COLUMNS) - 1, "the other columns go on"
     project.fail(None)

@@ -13,6 +13,7 @@ HERE = Path(__file__).resolve().parent
 BUILD = Path(os.environ["SGF_BUILD_DIR"])
 SHIFT = 6
 SIZE = (60, 100)  # rows, columns
+METHODS = ["bm", "mesh", "sgm", "opencv_bm", "opencv_sgbm"]
 
 
 def run(program, *arguments):
@@ -87,14 +88,82 @@ def test_a_dataset_folder_gives_a_folder_a_scene(scene, tmp_path):
     assert json.loads((tmp_path / "out" / "Wall" / "scores.json").read_text())["all"]["bad1_pct"] < 1
 
 
-@pytest.mark.parametrize("method", ["bm", "opencv_bm"])
-def test_both_methods_print_all_their_options(pair, tmp_path, method):
-    result = run("sgf_stereo", *pair, "-o", tmp_path / "out", "--method", method, "--window", 11)
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_finds_the_wall_and_prints_all_its_options(scene, pair, tmp_path, method):
+    out = tmp_path / "out"
+    flags = ["--method", method, "--window", 11, "--max-disp", 16, "--gt", scene / "disp0GT.pfm"]
+    result = run("sgf_stereo", *pair, "-o", out, *flags)
     assert result.returncode == 0, result.stderr
-    options = (tmp_path / "out" / "options.yaml").read_text()
-    assert f"method: {method}" in options
-    assert ("window: 11" if method == "bm" else "block_size: 11") in options
-    assert "speckle" in options and "uniqueness" in options
+    scores = json.loads((out / "scores.json").read_text())["all"]
+    assert scores["bad1_pct"] < 2 and scores["invalid_pct"] < 40
+    options = (out / "options.yaml").read_text()
+    assert f"method: {method}\n" in options
+    assert ("block_size: 11" if method.startswith("opencv") else "window: 11") in options
+    assert ("random_trials" if method == "mesh" else "uniqueness") in options
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_colour_images_are_taken_by_every_method(pair, tmp_path, method):
+    for image in pair:
+        grey = np.array(Image.open(image))
+        Image.fromarray(np.stack([grey, grey // 2, 255 - grey], axis=2)).save(image)
+    result = run("sgf_stereo", *pair, "-o", tmp_path / "out", "--method", method, "--max-disp", 16)
+    assert result.returncode == 0, result.stderr
+    disparity = read_pfm(tmp_path / "out" / "disparity.pfm")[:, 16:]
+    assert np.median(disparity[np.isfinite(disparity)]) == pytest.approx(SHIFT, abs=0.1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_fill_leaves_no_hole(pair, tmp_path, method):
+    flags = ["--method", method, "--max-disp", 16]
+    assert run("sgf_stereo", *pair, "-o", tmp_path / "plain", *flags).returncode == 0
+    assert run("sgf_stereo", *pair, "-o", tmp_path / "filled", *flags, "--fill").returncode == 0
+    plain, filled = (read_pfm(tmp_path / name / "disparity.pfm") for name in ("plain", "filled"))
+    found = np.isfinite(plain)
+    assert np.isfinite(filled).all() and np.array_equal(filled[found], plain[found])
+    assert found.all() == (method == "mesh")
+    assert "fill: true" in (tmp_path / "filled" / "options.yaml").read_text()
+
+
+def test_mesh_writes_its_mesh_and_what_the_right_image_confirms(pair, tmp_path):
+    out = tmp_path / "out"
+    assert run("sgf_stereo", *pair, "-o", out, "--method", "mesh", "--max-disp", 16).returncode == 0
+    header = (out / "mesh.ply").read_bytes().split(b"end_header\n")[0].decode()
+    assert header.startswith("ply\n") and "element vertex" in header and "element face" in header
+    valid = np.array(Image.open(out / "valid.png"))
+    assert valid.shape == SIZE and set(np.unique(valid)) <= {0, 255}
+    assert (valid[:, SHIFT:] == 255).mean() > 0.9
+
+
+def defined(result, folder):
+    """A disparity map, or bad input named: exit code 2 and one line."""
+    if result.returncode == 2:
+        return len(result.stderr.strip().splitlines()) == 1
+    assert result.returncode == 0, result.stderr
+    disparity = read_pfm(folder / "disparity.pfm")
+    return ((disparity > -1) | ~np.isfinite(disparity)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rows, columns", [(1, 1), (2, 3), (7, 9), (40, 60)])
+def test_textureless_and_tiny_images_give_a_result_or_an_error(tmp_path, method, rows, columns):
+    image = tmp_path / "flat.png"
+    Image.fromarray(np.full((rows, columns), 77, np.uint8)).save(image)
+    for count in (1, min(16, columns)):
+        out = tmp_path / f"out{count}"
+        flags = ["--method", method, "--max-disp", count, "--window", 5]
+        assert defined(run("sgf_stereo", image, image, "-o", out, *flags), out)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_one_disparity_is_searched(pair, tmp_path, method):
+    out = tmp_path / "out"
+    flags = ["--method", method, "--max-disp", 1, "--min-disparity", SHIFT]
+    result = run("sgf_stereo", *pair, "-o", out, *flags)
+    assert result.returncode == 0, result.stderr
+    disparity = read_pfm(out / "disparity.pfm")
+    if not method.startswith("opencv"):  # which rounds up to 16
+        assert set(np.unique(disparity[np.isfinite(disparity)])) == {SHIFT}
 
 
 def test_instruction_sets_and_threads_give_the_same_file(pair, tmp_path):
@@ -129,10 +198,11 @@ def test_bad_images_are_named(scene, pair, tmp_path):
     assert fails(run("sgf_stereo", cut, pair[1], "-o", out), cut)
     small = tmp_path / "small.png"
     Image.fromarray(np.zeros((30, 50), np.uint8)).save(small)
-    for method in ("bm", "opencv_bm"):
+    for method in METHODS:
         result = run("sgf_stereo", pair[0], small, "-o", out, "--method", method)
         assert fails(result, "50x30", "100x60")
-    assert fails(run("sgf_stereo", small, small, "-o", out, "--window", 31), "window", "31", "50x30")
+    flags = ["-o", out, "--window", 31, "--max-disp", 16]
+    assert fails(run("sgf_stereo", small, small, *flags), "window", "31", "50x30")
     assert not out.exists()
 
 
@@ -158,13 +228,23 @@ def test_bad_truth_is_named_and_leaves_nothing_behind(pair, tmp_path):
         (["--window", "8"], ["window", "8"]),
         (["--window", "wide"], ["window", "wide"]),
         (["--uniqueness", "-1"], ["uniqueness", "-1"]),
-        (["--method", "magic"], ["magic", "opencv_bm"]),
+        (["--method", "magic"], ["magic", "bm, mesh, sgm, opencv_bm, opencv_sgbm"]),
         (["--isa", "mmx"], ["mmx"]),
         (["--method", "opencv_bm", "--uniqueness", "-3"], ["uniqueness", "-3"]),
         (["--method", "opencv_bm", "--uniqueness", "2.5"], ["uniqueness", "2.5"]),
         (["--method", "opencv_bm", "--window", "257"], ["window", "257"]),
         (["--method", "opencv_bm", "--max-disp", "0"], ["num_disparities", "0"]),
         (["--method", "opencv_bm", "--metric", "sgf"], ["metric", "opencv_bm"]),
+        (["--method", "opencv_bm", "--window", "61"], ["window", "61", "100x60"]),
+        (["--method", "opencv_sgbm", "--window", "4"], ["window", "4"]),
+        (["--method", "opencv_sgbm", "--p1", "4"], ["p1", "opencv_sgbm"]),
+        (["--method", "bm", "--p1", "4"], ["p1", "bm"]),
+        (["--method", "mesh", "--uniqueness", "5"], ["uniqueness_pct", "mesh"]),
+        (["--method", "mesh", "--window", "8"], ["window", "8"]),
+        (["--method", "sgm", "--texture-threshold", "5"], ["texture_threshold", "sgm"]),
+        (["--method", "sgm", "--p1", "100"], ["p1", "100"]),
+        (["--method", "sgm", "--max-disp", "101"], ["num_disparities", "101", "100"]),
+        (["--method", "mesh", "--max-disp", "101"], ["num_disparities", "101", "100"]),
         (["--layout", "kitti2015"], ["--layout"]),
         (["--gt-scale", "4"], ["--gt-scale"]),
     ],
@@ -179,6 +259,14 @@ def test_an_unknown_key_is_named_with_file_and_line(pair, tmp_path):
     config.write_text("window: 5\nwindwo: 7\n")
     result = run("sgf_stereo", *pair, "-o", tmp_path / "out", "--config", config)
     assert fails(result, f"{config}:2", "windwo")
+
+
+def test_a_file_with_an_option_of_another_method_is_an_error(pair, tmp_path):
+    config = tmp_path / "run.yaml"
+    config.write_text("p1: 5\n")
+    flags = ["-o", tmp_path / "out", "--config", config]
+    assert run("sgf_stereo", *pair, *flags, "--method", "sgm").returncode == 0
+    assert fails(run("sgf_stereo", *pair, *flags, "--method", "bm"), "p1", "bm")
 
 
 def test_bad_datasets_are_named(scene, tmp_path):
@@ -218,8 +306,10 @@ def sweep(scene, tmp_path):
     )
     (tmp_path / "sweep.yaml").write_text(
         "name: test\nmatcher: stereo_bm\ncolumns:\n  sgf: {options: {metric: sgf}}\n"
-        "  orig: {implementation: opencv_bm}\n"
-        "grid: {windows: [5, 9], uniqueness: [0, 15]}\n"
+        "  orig: {implementation: opencv_bm}\n  sgm: {implementation: sgm}\n"
+        "  mesh: {implementation: mesh}\n  sgbm: {implementation: opencv_sgbm}\n"
+        "  filled: {implementation: sgm, fill: true}\n"
+        "options: {left_right_max: 2}\ngrid: {windows: [5, 9], uniqueness: [0, 15]}\n"
     )
     return [
         "stereo", "--experiment", tmp_path / "sweep.yaml", "--catalogue", tmp_path / "catalogue.yaml",
@@ -227,7 +317,7 @@ def sweep(scene, tmp_path):
     ]
 
 
-@pytest.mark.parametrize("column", ["sgf", "orig"])
+@pytest.mark.parametrize("column", ["sgf", "orig", "sgm", "sgbm", "filled"])
 def test_a_sweep_scores_every_window_and_threshold(sweep, tmp_path, column):
     result = run("sgf_eval", *sweep, "--column", column, "--options-out", tmp_path / "options.yaml")
     assert result.returncode == 0, result.stderr
@@ -238,7 +328,19 @@ def test_a_sweep_scores_every_window_and_threshold(sweep, tmp_path, column):
     ]
     assert all(row["scene"] == "Wall" and row["region"] == "all" for row in rows)
     assert all(float(row["mean_px"]) < 0.1 for row in rows)
-    assert "options:" in (tmp_path / "options.yaml").read_text()
+    assert all((float(row["invalid_pct"]) == 0) == (column == "filled") for row in rows)
+    options = (tmp_path / "options.yaml").read_text()
+    assert f"fill: {str(column == 'filled').lower()}" in options
+    assert ("left_right_max: 2" in options) == (column not in ("orig", "sgbm"))
+
+
+def test_a_dense_method_is_swept_over_windows_only(sweep, tmp_path):
+    assert fails(run("sgf_eval", *sweep, "--column", "mesh"), "uniqueness", "15")
+    file = tmp_path / "sweep.yaml"
+    file.write_text(file.read_text().replace("[0, 15]", "[0]"))
+    result = run("sgf_eval", *sweep, "--column", "mesh")
+    assert result.returncode == 0, result.stderr
+    assert len((tmp_path / "raw.csv").read_text().splitlines()) == 1 + 2
 
 
 def test_bad_sweeps_are_named(sweep, tmp_path):
@@ -246,10 +348,28 @@ def test_bad_sweeps_are_named(sweep, tmp_path):
     file = tmp_path / "sweep.yaml"
     file.write_text(file.read_text().replace("metric: sgf", "metrik: sgf"))
     assert fails(run("sgf_eval", *sweep, "--column", "sgf"), f"{file}:4", "metrik")
+    file.write_text(file.read_text().replace("opencv_sgbm", "opencv_magic"))
+    assert fails(run("sgf_eval", *sweep, "--column", "sgbm"), "opencv_magic", "opencv_bm")
     file.write_text(file.read_text().replace("matcher: stereo_bm", "matcher: {}"))
     assert fails(run("sgf_eval", *sweep, "--column", "orig"), f"{file}:2")
     assert fails(run("sgf_eval", *sweep[:-4], "--dataset", "bridges", "--out", "x", "--column", "sgf"), "bridges")
     assert not (tmp_path / "raw.csv").exists()
+
+
+def test_a_change_is_made_to_the_right_images(sweep, tmp_path):
+    changes = tmp_path / "changes.yaml"
+    changes.write_text("changes:\n  dark: {exposure: 0.001}\n")
+    options = tmp_path / "options.yaml"
+    more = ["--column", "sgf", "--changes", changes, "--change", "dark", "--window", 9]
+    result = run("sgf_eval", *sweep, *more, "--options-out", options)
+    assert result.returncode == 0, result.stderr
+    header, *lines = (tmp_path / "raw.csv").read_text().splitlines()
+    rows = [dict(zip(header.split(","), line.split(","))) for line in lines]
+    assert [(row["window"], row["uniqueness"]) for row in rows] == [("9", "0"), ("9", "15")]
+    assert all(float(row["mean_px"]) == SHIFT for row in rows), "on a black image the first disparity wins"
+    assert "exposure: 0.001" in options.read_text()
+    result = run("sgf_eval", *sweep, "--column", "sgf", "--change", "dark")
+    assert result.returncode == 2 and "--changes" in result.stderr
 
 
 def test_another_project_links_the_installed_package(tmp_path):

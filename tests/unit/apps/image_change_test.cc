@@ -42,6 +42,47 @@ TEST(ImageChange, LocalLightHasItsFullStrengthInItsCentreOnly) {
   EXPECT_NEAR(changed(40, 60), 100, 1e-3);
 }
 
+TEST(ImageChange, GammaTurnsExposureAndVignetteIntoThoseOfLight) {
+  const cv::Mat1f encoded = Fractional({.gamma = 2.2, .exposure = 0.6, .vignette = 0.5});
+  EXPECT_NEAR(encoded(20, 30), 100 * std::pow(0.6, 1 / 2.2), 1e-3);
+  EXPECT_NEAR(encoded(0, 0), 100 * std::pow(0.3, 1 / 2.2), 1e-3);
+  const cv::Mat1f linear =
+      Fractional({.gamma = 2.2, .exposure = 0.6, .vignette = 0.5, .encode = false});
+  EXPECT_NEAR(linear(20, 30), 255 * std::pow(100 / 255.0, 2.2) * 0.6, 1e-3);
+  EXPECT_NEAR(linear(0, 0), 255 * std::pow(100 / 255.0, 2.2) * 0.3, 1e-3);
+}
+
+TEST(ImageChange, GammaAloneIsUndone) {
+  cv::Mat1b ramp(5, 256);
+  for (int x = 0; x < 256; ++x) ramp.col(x) = x;
+  EXPECT_EQ(cv::norm(ApplyChange(ramp, {.gamma = 2.2}, 1), ramp, cv::NORM_INF), 0);
+}
+
+TEST(ImageChange, ChannelsChangeLikeGreyImages) {
+  const ImageChange change{.blur = 1, .gamma = 2.2, .light = 0.3, .exposure = 0.8, .vignette = 0.4};
+  std::vector<cv::Mat> channels;
+  for (const int level : {0, 90, 180}) {
+    channels.push_back(kGrey + level);
+    channels.back().colRange(20, 25) = 7;
+  }
+  cv::Mat colour;
+  cv::merge(channels, colour);
+  std::vector<cv::Mat> changed;
+  cv::split(ApplyChange(colour, change, 1), changed);
+  ASSERT_EQ(changed.size(), 3u);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_EQ(cv::norm(changed[c], ApplyChange(channels[c], change, 1), cv::NORM_INF), 0);
+}
+
+TEST(ImageChange, ChannelsHaveNoiseOfTheirOwn) {
+  const cv::Mat3b grey(100, 100, cv::Vec3b(100, 100, 100));
+  std::vector<cv::Mat> changed;
+  cv::split(ApplyChange(grey, {.noise = 2, .quantise = false}, 1), changed);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(changed[0] - changed[2], mean, deviation);
+  EXPECT_NEAR(deviation[0], 2 * std::sqrt(2), 0.1);
+}
+
 TEST(ImageChange, QuantisedGreyLevelsAreRoundedAndSaturate) {
   EXPECT_EQ(ApplyChange(kGrey, {.exposure = 0.994}, 1).at<uchar>(3, 3), 99);
   EXPECT_EQ(ApplyChange(kGrey, {.exposure = 0.996}, 1).at<uchar>(3, 3), 100);
@@ -86,6 +127,7 @@ TEST(ImageChange, NamesTheOptionThatIsOutOfRange) {
   EXPECT_EQ(message({.vignette = -0.1}), "vignette: must be in [0, 1), got -0.1");
   EXPECT_EQ(message({.light = -1}), "light: must be finite and above -1, got -1");
   EXPECT_EQ(message({.light_radius = 0}), "light_radius: must be finite and positive, got 0");
+  EXPECT_EQ(message({.gamma = 0}), "gamma: must be finite and positive, got 0");
   EXPECT_EQ(message({.blur = -1}), "blur: must be finite and not negative, got -1");
   EXPECT_EQ(message({.noise = NAN}), "noise: must be finite and not negative, got nan");
   EXPECT_EQ(message({.offset = INFINITY}), "light_x, light_y and offset: must be finite, got inf");

@@ -5,7 +5,7 @@ import itertools
 import pytest
 
 from sgf_paper import config
-from sgf_paper.config import Column, Dataset, Grid, Sweep, Table, Tuning
+from sgf_paper.config import Column, Dataset, Grid, Sweep, Table, TableBlock, Tuning
 
 HEADER = (
     "dataset,scene,region,matcher,column,window,uniqueness,truth_px,matched_px,"
@@ -17,28 +17,53 @@ HEADER = (
 def sweep():
     columns = {
         "orig": Column("opencv_bm"),
-        "sgf": Column("block_matcher", {"metric": "sgf"}),
-        "ugf": Column("block_matcher", {"metric": "ugf"}, extra=True),
+        "sgf": Column("bm", {"metric": "sgf"}),
+        "ugf": Column("bm", {"metric": "ugf"}, extra=True),
     }
     grid = Grid(windows=[5, 9], uniqueness=[0, 10, 20])
     return Sweep("toy", "stereo_bm", {}, columns, grid, options={"left_right_max": 1})
 
 
 @pytest.fixture
-def table():
+def dense_sweep():
+    """A matcher that leaves no pixel out, so that there is nothing to sweep or to tune."""
+    columns = {"orig": Column("mesh", {"metric": "census_sobel"}), "sgf": Column("mesh")}
+    return Sweep("dense", "stereo_mesh", {}, columns, Grid(windows=[35], uniqueness=[0]))
+
+
+@pytest.fixture
+def block(sweep):
+    return TableBlock(
+        sweep,
+        fixed={"window": 9, "uniqueness": 10},
+        fixed_of={"orig": {"uniqueness": 20}},
+        tuning=Tuning("bad2_pct", 70),
+        published="stereo_bm",
+    )
+
+
+@pytest.fixture
+def table(block):
     return Table(
         kind="table",
         name="table9",
         title="A toy & a table",
-        sweep="toy",
         datasets=["big", "toys"],
         published="table_1_middlebury_2014_training_half",
         published_dataset="big",
-        fixed={"window": 9, "uniqueness": 10},
         quantities=["mean_px", "median_px", "bad2_pct", "invalid_pct"],
-        tuning=Tuning("bad2_pct", 70, [["b", "bL"]]),
-        fixed_of={"orig": {"uniqueness": 20}},
+        blocks=[block],
+        near_duplicates=[["b", "bL"]],
     )
+
+
+@pytest.fixture
+def two_blocks(table, dense_sweep):
+    """The table with a block of the dense matcher after the first."""
+    table.blocks.append(
+        TableBlock(dense_sweep, fixed={"window": 35, "uniqueness": 0}, published="mesh_stereo")
+    )
+    return table
 
 
 def mean_error(column, scene, window, uniqueness):
@@ -52,17 +77,19 @@ def mean_error(column, scene, window, uniqueness):
 def write_raw(tmp_path, sweep):
     """Writes raw scores of some scenes; returns the folder of raw scores."""
 
-    def write(dataset="toys", scenes=("a", "b", "c"), regions=("all", "noc"), error=mean_error):
-        folder = tmp_path / "raw" / sweep.name / dataset
+    def write(
+        dataset="toys", scenes=("a", "b", "c"), regions=("all", "noc"), error=mean_error, of=sweep
+    ):
+        folder = tmp_path / "raw" / of.name / dataset
         folder.mkdir(parents=True, exist_ok=True)
-        for column in sweep.columns:
+        for column in of.columns:
             lines = [HEADER]
-            points = itertools.product(scenes, regions, sweep.grid.windows, sweep.grid.uniqueness)
+            points = itertools.product(scenes, regions, of.grid.windows, of.grid.uniqueness)
             for scene, region, window, uniqueness in points:
                 mean = error(column, scene, window, uniqueness)
                 scores = [mean, 30 * mean, 20 * mean, 10 * mean, 15 * mean, 20 + uniqueness]
                 numbers = ",".join("nan" if s != s else f"{s:.6f}" for s in scores)
-                key = f"{dataset},{scene},{region},stereo_bm,{column},{window},{uniqueness}"
+                key = f"{dataset},{scene},{region},{of.matcher},{column},{window},{uniqueness}"
                 lines.append(f"{key},1000,700,{numbers},0.1\n")
             (folder / f"{column}.csv").write_text("".join(lines))
             options = f"options: {{metric: {column}, window: 21, nested: {{a: 1}}}}\n"

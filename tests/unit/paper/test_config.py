@@ -17,9 +17,17 @@ def test_every_experiment_is_read_and_named_after_its_file(name):
 
 def test_columns_of_the_paper_come_first_and_in_its_order():
     for table in config.load_experiments("table").values():
-        sweep = config.load_sweep(table.sweep)
-        published = config.load_published(table, sweep.matcher)["mean_px"]
-        assert sweep.main_columns == list(published) == list(sweep.columns)[: len(published)]
+        paper = list(config.load_published(table, "stereo_bm")["mean_px"])
+        for sweep in table.sweeps:
+            assert sweep.main_columns == paper == list(sweep.columns)[: len(paper)]
+
+
+@pytest.mark.parametrize("name", ["table1", "table2"])
+def test_tables_have_the_papers_two_matchers_and_semi_global_matching(name):
+    table = config.load_experiment(name)
+    blocks = {block.sweep.matcher: block.published for block in table.blocks}
+    assert blocks == {"stereo_bm": "stereo_bm", "stereo_mesh": "mesh_stereo", "stereo_sgm": ""}
+    assert [block.sweep.name for block in table.curve_blocks] == ["stereo_bm", "stereo_sgm"]
 
 
 def test_published_values_are_the_papers():
@@ -27,13 +35,15 @@ def test_published_values_are_the_papers():
     published = config.load_published(table, "stereo_bm")
     assert published["mean_px"]["sgf"] == 3.29
     assert published["invalid_pct"]["orig"] == 40.44
+    assert config.load_published(table, "mesh_stereo")["bad4_pct"]["sgf"] == 12.53
+    assert config.load_published(table, "") == {}
 
 
 def test_own_parameters_replace_the_shared_ones():
-    table = config.load_experiment("table1")
-    assert table.parameters("sgf").uniqueness == table.fixed["uniqueness"]
-    assert table.parameters("orig").uniqueness == table.fixed_of["orig"]["uniqueness"]
-    assert table.parameters("orig").window == table.fixed["window"]
+    block = config.load_experiment("table1").block("stereo_bm")
+    assert block.parameters("sgf").uniqueness == block.fixed["uniqueness"]
+    assert block.parameters("orig").uniqueness == block.fixed_of["orig"]["uniqueness"]
+    assert block.parameters("orig").window == block.fixed["window"]
 
 
 def test_options_shared_by_our_matcher_do_not_reach_opencv(sweep):
@@ -45,16 +55,22 @@ def change(**changes):
     return {**TABLE1, **changes}
 
 
+def change_block(**changes):
+    first, *others = TABLE1["blocks"]
+    return change(blocks=[{**first, **changes}, *others])
+
+
 @pytest.mark.parametrize(
     "node, message",
     [
         (change(colour="red"), "unknown key 'colour'"),
-        ({k: v for k, v in TABLE1.items() if k != "sweep"}, "key 'sweep' is missing"),
+        ({k: v for k, v in TABLE1.items() if k != "blocks"}, "key 'blocks' is missing"),
+        (change_block(colour="red"), "blocks: unknown key 'colour'"),
         (change(kind="chart"), "kind is 'chart'"),
-        (change(fixed={"window": 10, "uniqueness": 10}), "window 10 is not on the sweep's grid"),
-        (change(fixed={"window": 9, "uniqueness": 11}), "uniqueness 11 is not on the sweep's grid"),
-        (change(tuning={"objective": "bad2_pct"}), "tuning: key 'kept_pct' is missing"),
-        (change(sweep="nowhere"), "nowhere.yaml: cannot be read"),
+        (change_block(fixed={"window": 10, "uniqueness": 10}), "window 10 is not on the sweep's grid"),
+        (change_block(fixed={"window": 9, "uniqueness": 11}), "uniqueness 11 is not on the sweep's grid"),
+        (change_block(tuning={"objective": "bad2_pct"}), "tuning: key 'kept_pct' is missing"),
+        (change_block(sweep="nowhere"), "nowhere.yaml: cannot be read"),
         ([1, 2], "expected a map"),
     ],
 )
@@ -96,3 +112,8 @@ def test_a_figure_takes_the_first_group_at_hand_and_only_scenes_that_exist(tmp_p
     assert (group.dataset, [scene.name for scene in group.scenes]) == ("debian_pairs", ["Motorcycle"])
     left.unlink()
     assert figure.group(datasets) is None
+
+
+def test_a_figure_of_a_sweep_that_its_table_lacks_is_an_error(table):
+    with pytest.raises(ConfigError, match="table9 has no block of sweep stereo_sgm"):
+        table.block("stereo_sgm")

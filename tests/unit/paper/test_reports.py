@@ -8,47 +8,64 @@ import pytest
 from PIL import Image
 
 from sgf_paper import bench, config, density, disparity_figure, images, progress, style
-from sgf_paper.config import Density, FigureScene, Parameters
+from sgf_paper.config import Column, Density, FigureScene, Parameters
 
 
 @pytest.fixture
-def panels(table, sweep, write_raw, datasets):
+def panels(two_blocks, dense_sweep, write_raw, datasets):
     experiment = Density("density", "density", "Title", ["table9"], ["mean_px"], [65, 75, 95])
-    curves = density.make_curves(experiment, {"table9": table}, sweep, write_raw(), datasets)
-    return experiment, curves
+    write_raw(of=dense_sweep)
+    rows = density.make_curves(experiment, {"table9": two_blocks}, write_raw(), datasets)
+    return experiment, rows
 
 
 def test_curves_use_the_tables_window_for_every_region(panels):
-    _, curves = panels
-    assert [(p.dataset, p.region, p.window, p.scenes) for p in curves] == [
-        ("toys", "all", 9, 3),
-        ("toys", "noc", 9, 3),
+    _, rows = panels
+    assert [[(p.dataset, p.region, p.matcher, p.window, p.scenes) for p in row] for row in rows] == [
+        [("toys", "all", "stereo_bm", 9, 3)],
+        [("toys", "noc", "stereo_bm", 9, 3)],
     ]
-    points = curves[next(iter(curves))]["sgf"]
+    points = rows[0][next(iter(rows[0]))]["sgf"]
     assert list(points["kept_pct"]) == [60, 70, 80]
 
 
-def test_equal_shares_are_read_off_the_curves(panels, sweep):
-    experiment, curves = panels
-    equal = density.equal_table(curves, sweep, experiment.kept_pct)
+def test_panels_that_two_tables_share_are_drawn_twice_and_listed_once(table, write_raw, datasets):
+    tables = {"one": table, "two": table}
+    experiment = Density("density", "density", "Title", list(tables), ["mean_px"], [65])
+    rows = density.make_curves(experiment, tables, write_raw(), datasets)
+    assert len(rows) == 4
+    assert len(density.equal_table(rows, [65])) == 2 * 3
+
+
+def test_filled_columns_have_no_curve(table, sweep, write_raw, datasets):
+    raw = write_raw()
+    sweep.columns["ugf"] = Column("bm", fill=True, extra=True)
+    experiment = Density("density", "density", "Title", ["table9"], ["mean_px"], [65])
+    rows = density.make_curves(experiment, {"table9": table}, raw, datasets)
+    assert {column for row in rows for curves in row.values() for column in curves} == {"orig", "sgf"}
+
+
+def test_equal_shares_are_read_off_the_curves(panels):
+    experiment, rows = panels
+    equal = density.equal_table(rows, experiment.kept_pct)
     sgf = equal[(equal["cost"] == "sgf") & (equal["region"] == "all")].set_index("kept_pct")
     # at window 9 the mean over scenes is 1 + 1 + 0.5/3 - uniqueness/100; 65 % kept is uniqueness 15
     assert sgf.loc[65, "mean_px"] == pytest.approx(2 + 0.5 / 3 - 0.15)
     assert math.isnan(sgf.loc[95, "mean_px"])
 
 
-def test_the_curve_table_has_a_line_per_point(panels, sweep):
-    _, curves = panels
-    table = density.curve_table(curves, sweep)
+def test_the_curve_table_has_a_line_per_point(panels):
+    _, rows = panels
+    table = density.curve_table(rows)
     assert len(table) == 2 * 3 * 3
     assert list(table.columns) == density.CURVE_COLUMNS
 
 
-def test_figures_repeat_to_the_byte(panels, sweep, tmp_path):
-    experiment, curves = panels
+def test_figures_repeat_to_the_byte(panels, tmp_path):
+    experiment, rows = panels
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
-        style.save(density.draw(curves, sweep, experiment), tmp_path / folder, "density")
+        style.save(density.draw(rows, ["ugf"], experiment), tmp_path / folder, "density")
     for name in ("density.pdf", "density.png"):
         first, second = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
         assert len(first) > 1000 and first == second
@@ -85,11 +102,14 @@ def test_shuffled_runs_are_listed_in_the_programs_order(report):
 
 def test_ratios_stand_against_the_same_instruction_set_or_the_fastest(report):
     names = {"c/opencv_bm/avx2/1": 100, "c/opencv_bm/sse4/1": 120, "c/opencv_bm/avx2/2": 900,
-             "c/sgf_bm/avx2/1": 200, "c/sgf_bm/avx3/1": 300, "c/sgf_bm/avx3/2": 570}  # fmt: skip
+             "c/sgf_bm/avx2/1": 200, "c/sgf_bm/avx3/1": 300, "c/sgf_bm/avx3/2": 570,
+             "c/opencv_sgbm/own/1": 40, "c/sgf_sgm/avx3/1": 60}  # fmt: skip
     speeds = bench.read_report(report([run(name, speed) for name, speed in names.items()]))
-    ratios = bench.ratios_to_opencv(speeds).set_index("isa")["ratio"]
-    assert ratios["avx2"] == pytest.approx(2.0)
-    assert ratios["avx3"] == pytest.approx(300 / 120)
+    ratios = bench.ratios_to_opencv(speeds).set_index(["implementation", "isa"])
+    assert ratios["ratio"].to_dict() == pytest.approx(
+        {("sgf_bm", "avx2"): 2.0, ("sgf_bm", "avx3"): 300 / 120, ("sgf_sgm", "avx3"): 1.5}
+    )
+    assert ratios.loc[("sgf_sgm", "avx3"), "peer"] == "cv::StereoSGBM"
     scaling = bench.scaling(speeds).set_index("implementation")["ratio"]
     assert scaling["sgf_bm"] == pytest.approx(1.9)
     assert scaling["opencv_bm"] == pytest.approx(9.0)
@@ -143,23 +163,41 @@ def test_the_matcher_is_called_as_the_sweep_would(tmp_path, sweep):
     assert (flags["--method"], flags["--max-disp"]) == ("opencv_bm", "128")
 
 
-@pytest.mark.parametrize("width, rows", [(30, 1), (90, 3)])
-def test_wide_images_stand_two_abreast_on_one_colour_scale(width, rows):
+def test_the_matcher_is_called_without_what_a_dense_method_lacks(tmp_path, dense_sweep):
+    scene = FigureScene("s", "l.png", "r.png", "t.pfm", num_disparities=128)
+    at = Parameters(35, 0)
+    command = disparity_figure.matcher_command(tmp_path, tmp_path, scene, dense_sweep, "sgf", at)
+    assert set(flags_of(command)) == {"--gt", "--method", "--max-disp", "--window"}
+    dense_sweep.columns["filled"] = Column("sgm", fill=True)
+    command = disparity_figure.matcher_command(tmp_path, tmp_path, scene, dense_sweep, "filled", at)
+    assert command[-1] == "--fill"
+
+
+@pytest.mark.parametrize("width, grid", [(30, (2, 4)), (90, (3, 3))])
+def test_wide_images_stand_above_the_matchers_rows_on_one_colour_scale(width, grid):
     truth = np.linspace(1, 40, 30 * width).reshape(30, width)
     truth[0, 0] = np.nan
     image = np.zeros((30, width), dtype=np.uint8)
     half = np.where(np.arange(width) % 2, truth, np.nan)
-    scene = disparity_figure.Scene("s", image, truth, [half, truth + 100, truth])
+    maps = [half, truth + 100, truth]
+    scene = disparity_figure.Scene("s", image, truth, {"A": maps, "B": maps[::-1]})
     drawing = disparity_figure.draw([scene], ["one", "two", "three"])
-    panels = [axis for axis in drawing.axes if axis.get_title()]
-    kept = ["one (50 % kept)", "two (100 % kept)", "three (100 % kept)"]
-    assert [axis.get_title() for axis in panels] == ["s, image", "ground truth", *kept]
-    assert {axis.get_gridspec().nrows for axis in panels} == {rows}
-    assert {axis.get_images()[0].get_clim() for axis in panels[1:]} == {(0.0, 40.0)}
+    panels = {axis.get_title(): axis for axis in drawing.axes if axis.get_title()}
+    assert set(panels) == {
+        "s, image", "ground truth", "A, one (50 % kept)", "A, two (100 % kept)",
+        "A, three (100 % kept)", "B, one (100 % kept)", "B, two (100 % kept)", "B, three (50 % kept)",
+    }  # fmt: skip
+    cells = panels["s, image"].get_gridspec()
+    assert (cells.nrows, cells.ncols) == grid
+    row = [panels[f"A, {name} kept)"].get_subplotspec().rowspan.start
+           for name in ("one (50 %", "two (100 %", "three (100 %")]  # fmt: skip
+    assert row == [grid[0] - 2] * 3
+    del panels["s, image"]
+    assert {axis.get_images()[0].get_clim() for axis in panels.values()} == {(0.0, 40.0)}
 
 
 def test_every_column_has_its_own_line():
-    sweep = config.load_sweep("stereo_bm")
+    sweep = config.load_sweep("stereo_bm")  # of those with curves the one with most columns
     extra = [name for name in sweep.columns if name not in sweep.main_columns]
     styles = [tuple(sorted(map(str, style.line_style(c, extra).items()))) for c in sweep.columns]
     assert len(set(styles)) == len(sweep.columns)

@@ -6,13 +6,21 @@ import pandas as pd
 import pytest
 
 from sgf_paper import config, scores, text
+from sgf_paper.config import Column, Parameters
 from sgf_paper.scores import ScoresError
-from sgf_paper.table import CSV_COLUMNS, TableMaker, choice_texts, options_of_columns, write_csvs
+from sgf_paper.table import (
+    CHOICE_COLUMNS,
+    CSV_COLUMNS,
+    choice_texts,
+    make_report,
+    options_of_columns,
+    write_csvs,
+)
 
 
 @pytest.fixture
-def report(table, sweep, write_raw):
-    return TableMaker(table, sweep, write_raw(), ["toys"]).make()
+def report(table, write_raw):
+    return make_report(table, write_raw(), ["toys"])
 
 
 def value(frame, cost, quantity, dataset="toys", region="all", name="measured"):
@@ -46,30 +54,30 @@ def test_published_values_of_an_absent_dataset_stand_alone(report):
     assert "ugf" not in set(report.fixed.loc[report.fixed["dataset"] == "big", "cost"])
 
 
-def test_published_values_stand_beside_their_own_dataset_only(table, sweep, write_raw):
+def test_published_values_stand_beside_their_own_dataset_only(table, write_raw):
     write_raw("big", regions=("all",))
-    report = TableMaker(table, sweep, write_raw("toys"), ["big", "toys"]).make()
+    report = make_report(table, write_raw("toys"), ["big", "toys"])
     assert value(report.fixed, "sgf", "mean_px", "big", name="published") == 3.29
     assert value(report.fixed, "sgf", "mean_px", "big") == pytest.approx(6.2 / 3)
     assert report.fixed.loc[report.fixed["dataset"] == "toys", "published"].isna().all()
     assert set(report.fixed.loc[report.fixed["dataset"] == "big", "region"]) == {"all"}
 
 
-def test_scenes_won_count_the_papers_columns_only_and_ties_for_all(table, sweep, write_raw):
+def test_scenes_won_count_the_papers_columns_only_and_ties_for_all(table, write_raw):
     def error(column, scene, *_):
         return {"orig": 1.0, "sgf": 1.0 if scene == "a" else 2.0, "ugf": 0.1}[column]
 
-    report = TableMaker(table, sweep, write_raw(error=error), ["toys"]).make()
+    report = make_report(table, write_raw(error=error), ["toys"])
     wins = report.wins[(report.wins["region"] == "all") & (report.wins["quantity"] == "mean_px")]
     assert dict(zip(wins["cost"], wins["won"])) == {"orig": 3, "sgf": 1}
     assert set(wins["scenes"]) == {3}
 
 
-def test_a_scene_without_a_match_is_left_out_of_the_mean_and_of_the_count(table, sweep, write_raw):
+def test_a_scene_without_a_match_is_left_out_of_the_mean_and_of_the_count(table, write_raw):
     def error(column, scene, *_):
         return math.nan if scene == "a" else 2.0
 
-    report = TableMaker(table, sweep, write_raw(error=error), ["toys"]).make()
+    report = make_report(table, write_raw(error=error), ["toys"])
     assert value(report.fixed, "sgf", "mean_px") == 2.0
     assert value(report.fixed, "sgf", "mean_px", name="scenes") == 2
     assert value(report.fixed, "sgf", "invalid_pct", name="scenes") == 3
@@ -79,30 +87,47 @@ def test_cross_validated_values_use_the_other_folds_parameters(report):
     # Folds: a and c against b. Trained on b, window 9 is best; on a and c both windows are equal
     # (one prefers each), so the first, 5, is taken. 70 % kept is uniqueness 10 throughout.
     chosen = report.choices[(report.choices["column"] == "sgf") & (report.choices["region"] == "all")]
-    assert dict(zip(chosen["fold"], chosen["window"])) == {0: 9, 1: 5}
-    assert set(chosen["uniqueness"]) == {10}
+    assert dict(zip(chosen["fold"], chosen["parameters"])) == {0: Parameters(9, 10), 1: Parameters(5, 10)}
     # a at 9: 0.9; c at 9: 3.4; b at 5: 2.4
     assert value(report.tuned, "sgf", "mean_px") == pytest.approx(6.7 / 3)
     assert value(report.tuned, "sgf", "mean_px", name="scenes") == 3
 
 
-def test_one_scene_gives_no_cross_validated_rows(table, sweep, write_raw):
-    report = TableMaker(table, sweep, write_raw(scenes=("a",)), ["toys"]).make()
+def test_filled_columns_are_scored_and_not_tuned(table, sweep, write_raw):
+    sweep.columns["ugf"] = Column("bm", fill=True, extra=True)
+    report = make_report(table, write_raw(), ["toys"])
+    assert "ugf" in set(report.fixed["cost"])
+    assert "ugf" not in set(report.tuned["cost"]) | set(report.choices["column"])
+
+
+def test_one_scene_gives_no_cross_validated_rows(table, write_raw):
+    report = make_report(table, write_raw(scenes=("a",)), ["toys"])
     assert report.tuned.empty and report.choices.empty
     assert not report.fixed.empty
 
 
 def test_choices_as_text():
-    columns = ["dataset", "region", "column", "fold", "window", "uniqueness", "reached"]
-    rows = [("d", "all", "sgf", 0, 9, 10.0, True), ("d", "all", "pm", 1, 5, 2.0, False)]
-    texts = choice_texts(pd.DataFrame(rows, columns=columns))
-    assert texts == {"d, all": {"sgf": ["9 px, 10 %", "–"], "pm": ["–", "5 px, 2 % *"]}}
+    rows = [
+        ("d", "all", "stereo_bm", "sgf", 0, Parameters(9, 10.0), True),
+        ("d", "all", "stereo_bm", "pm", 1, Parameters(5, 2.0), False),
+    ]
+    texts = choice_texts(pd.DataFrame(rows, columns=CHOICE_COLUMNS))
+    assert texts == {"d, all, StereoBM": {"sgf": ["9 px, 10 %", "–"], "pm": ["–", "5 px, 2 % *"]}}
 
 
 def test_options_are_listed_without_those_that_the_sweep_sets(sweep, write_raw):
     options = options_of_columns(write_raw(), sweep, "toys")
     assert options["sgf"] == "metric sgf, nested.a 1"
     assert list(options) == list(sweep.columns)
+
+
+def test_penalties_that_follow_the_window_are_not_listed_for_opencv(sweep, write_raw):
+    raw = write_raw()
+    for column in ("orig", "sgf"):
+        path = scores.raw_path(raw, "toy", "toys", column).with_suffix(".options.yaml")
+        path.write_text("options: {p1: 72, p2: 288, mode: sgbm}\n")
+    options = options_of_columns(raw, sweep, "toys")
+    assert (options["orig"], options["sgf"]) == ("mode sgbm", "p1 72, p2 288, mode sgbm")
 
 
 def test_csv_files_hold_the_contract(report, tmp_path):
@@ -117,6 +142,28 @@ def test_csv_files_hold_the_contract(report, tmp_path):
     assert (tmp_path / "table9_tuned.csv").exists() and (tmp_path / "table9_wins.csv").exists()
 
 
+def test_matchers_stand_together_and_are_measured_apart(two_blocks, dense_sweep, write_raw, tmp_path):
+    write_raw(of=dense_sweep, error=lambda column, *_: {"orig": 1.0, "sgf": 0.5}[column])
+    report = make_report(two_blocks, write_raw(), ["toys"])
+    order = report.fixed[["dataset", "region", "matcher"]].drop_duplicates().to_numpy().tolist()
+    assert order == [
+        [dataset, region, matcher]
+        for dataset in ("toys", "big")
+        for region in ("all", "noc")
+        for matcher in ("stereo_bm", "stereo_mesh")
+    ]
+    mesh = report.fixed[report.fixed["matcher"] == "stereo_mesh"]
+    assert value(mesh, "sgf", "mean_px") == 0.5
+    assert value(mesh, "sgf", "mean_px", "big", name="published") == 4.17
+    assert set(report.tuned["matcher"]) == {"stereo_bm"} == set(report.choices["matcher"])
+    wins = report.wins[report.wins["matcher"] == "stereo_mesh"]
+    assert dict(zip(wins["cost"], wins["won"])) == {"orig": 0, "sgf": 3}
+    write_csvs(report, tmp_path, "two")
+    lines = (tmp_path / "two.csv").read_text().splitlines()
+    assert "toys,all,stereo_mesh,sgf,mean_px,0.5000,,3" in lines
+    assert len(pd.read_csv(tmp_path / "two_scenes.csv")) == 3 * 2 * (3 + 2)
+
+
 @pytest.fixture
 def blocks(report, table, sweep):
     return text.make_blocks(report.fixed, report.wins, table.quantities, sweep.main_columns)
@@ -124,7 +171,7 @@ def blocks(report, table, sweep):
 
 def test_only_the_best_column_of_the_paper_is_marked(blocks):
     first = blocks[0]
-    assert (first.dataset, first.region, first.scenes) == ("toys", "all", 3)
+    assert (first.dataset, first.region, first.matcher, first.scenes) == ("toys", "all", "StereoBM", 3)
     marked = {row.cost: [cell.best for cell in row.cells] for row in first.rows}
     assert marked["sgf"] == [True, True, True, False]
     assert not any(marked["orig"]) and not any(marked["ugf"])
@@ -133,33 +180,37 @@ def test_only_the_best_column_of_the_paper_is_marked(blocks):
     assert not any(cell.best for row in published.rows for cell in row.cells)
 
 
-def render(extension, blocks, table, sweep):
+def render(extension, blocks, table):
     return text.render(
         f"table.{extension}.j2",
         table=table,
-        sweep=sweep,
         labels=[text.LABELS[quantity] for quantity in table.quantities],
         absent=["big"],
         fixed=blocks,
         tuned=[],
         choices={},
         folds={"toys": {"a": 0, "b": 1}},
-        options={column: f"metric {column}" for column in sweep.columns},
+        options={s.name: {column: f"metric {column}" for column in s.columns} for s in table.sweeps},
     )
 
 
-def test_markdown_shows_measured_and_published_and_what_is_absent(blocks, table, sweep):
-    document = render("md", blocks, table, sweep)
+def test_markdown_shows_measured_and_published_and_what_is_absent(blocks, two_blocks):
+    document = render("md", blocks, two_blocks)
     assert "| sgf | **2.07** | **1.90** | **41.33** | 30.00 | 3/3 |" in document
     assert "| sgf | – (3.29) |" in document
     assert "Not present, so not measured: big." in document
     assert "The paper does not state its region" in document
     assert "Not possible here" in document
     assert "| orig | opencv_bm | metric orig |" in document
+    assert "| orig | mesh | metric orig |" in document
+    assert "StereoBM, fixed: window 9 px, uniqueness 10 %; orig: uniqueness 20." in document
+    assert "MeshStereo, fixed: window 35 px, uniqueness 0 %." in document
+    assert "- StereoBM: bad2_pct with 70 % kept; 2 windows x 3 values" in document
+    assert "- MeshStereo" not in document
 
 
-def test_latex_is_a_tabular_of_equal_rows(blocks, table, sweep):
-    document = render("tex", blocks, table, sweep)
+def test_latex_is_a_tabular_of_equal_rows(blocks, table):
+    document = render("tex", blocks, table)
     body = document.split("\\midrule", 1)[1].split("\\bottomrule")[0]
     rows = [line for line in body.splitlines() if line.endswith("\\\\") and "multicolumn" not in line]
     assert rows and {row.count(" & ") for row in rows} == {len(table.quantities)}

@@ -36,7 +36,7 @@ def test_middleburys_near_duplicates_share_a_fold():
         "Adirondack ArtL Jadeplant Motorcycle MotorcycleE Piano PianoL Pipes Playroom Playtable "
         "PlaytableP Recycle Shelves Teddy Vintage"
     ).split()
-    folds = assign_folds(names, config.load_experiment("table1").tuning.near_duplicates)
+    folds = assign_folds(names, config.load_experiment("table1").near_duplicates)
     for one, other in (("Motorcycle", "MotorcycleE"), ("Piano", "PianoL"), ("Playtable", "PlaytableP")):
         assert folds[one] == folds[other]
     assert sorted([list(folds.values()).count(0), list(folds.values()).count(1)]) == [7, 8]
