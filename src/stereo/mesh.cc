@@ -148,7 +148,12 @@ double TwiceArea(cv::Point2f a, cv::Point2f b, cv::Point2f c) {
 
 // Delaunay triangles as indices into `points`, in an order that follows the image's rows.
 std::vector<std::array<int, 3>> Delaunay(const std::vector<cv::Point>& points, cv::Size size) {
-  cv::Subdiv2D subdivision({0, 0, size.width + 1, size.height + 1});
+  constexpr int kFar = 20;
+  // Subdiv2D starts from a triangle around its rectangle, and cuts away what flat triangles on the
+  // image's outline it takes for parts of it: the farther away, the fewer.
+  const int margin = kFar * std::max(size.width, size.height);
+  cv::Subdiv2D subdivision(
+      {-margin, -margin, size.width + 1 + 2 * margin, size.height + 1 + 2 * margin});
   cv::Mat1i index(size.height + 1, size.width + 1, kNone);
   for (size_t i = 0; i < points.size(); ++i) {
     subdivision.insert(cv::Point2f(points[i]));

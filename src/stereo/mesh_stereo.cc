@@ -66,7 +66,7 @@ struct Side {
 class Start {
  public:
   Start(const cv::Mat& left, const cv::Mat& right, const CostOptions& options)
-      : left_(left), right_(right), matcher_(OptionsOf(options)) {}
+      : left_(left), right_(right), matcher_(OptionsOf(options, left.size())) {}
 
   cv::Mat1f Left() const { return Dense(left_, right_); }
 
@@ -80,10 +80,12 @@ class Start {
   }
 
  private:
-  static SemiGlobalOptions OptionsOf(const CostOptions& cost) {
+  static SemiGlobalOptions OptionsOf(const CostOptions& cost, cv::Size size) {
     SemiGlobalOptions options;
     static_cast<CostOptions&>(options) = cost;
     options.uniqueness_pct = 0;
+    const int side = std::min(size.width, size.height);
+    options.window = std::min(options.window, side - 1 + side % 2);  // the largest odd one
     return options;
   }
 

@@ -63,9 +63,9 @@ void CheckOptions(const SemiGlobalOptions& options);
 /// inside the image can win; the others take part in paths, with the right image's border column
 /// repeated.
 ///
-/// Memory grows with width * disparities * sqrt(height), 9 bytes each: 10 MB for 741 x 497 px and
-/// 64 disparities, 350 MB for 2960 x 1980 px and 288. Costs are made twice and half of the path
-/// costs are followed twice for it. At most two threads have work.
+/// Memory grows with width * disparities * sqrt(height): 25 MB for 741 x 497 px and 128
+/// disparities, 125 MB for 1482 x 994 px and 256. In return, costs are made twice and half of the
+/// paths are followed twice. At most two threads have work.
 ///
 /// Results are the same bits for any number of threads and any instruction set.
 class SemiGlobal {

@@ -38,9 +38,10 @@ def require_dataset(frame, dataset):
     return measured
 
 
-def values(frame, region, quantity):
-    """One quantity by cost."""
+def values(frame, region, quantity, matcher="stereo_bm"):
+    """One quantity of a matcher by cost."""
     chosen = frame[(frame["region"] == region) & (frame["quantity"] == quantity)]
+    chosen = chosen[chosen["matcher"] == matcher]
     return chosen.set_index("cost")["measured"]
 
 
@@ -104,6 +105,7 @@ def test_sgf_is_first_on_middlebury_at_equal_density(quantity):
     require_dataset(read(TABLES, "table1"), "middlebury2014_q")
     curves = read(TABLES, "density_equal")
     curves = curves[(curves["dataset"] == "middlebury2014_q") & (curves["region"] == "all")]
+    curves = curves[curves["matcher"] == "stereo_bm"]
     wide = curves.pivot(index="kept_pct", columns="cost", values=quantity)
     compared = wide[["sgf", *OTHERS]].dropna()
     assert len(compared) >= 3

@@ -13,7 +13,10 @@
 
 #include <sgf/core/options.h>
 #include <sgf/core/simd.h>
+#include <sgf/stereo/cost_rows.h>
+#include <sgf/stereo/mesh_refine.h>
 #include <sgf/stereo/mesh_stereo.h>
+#include <sgf/stereo/plane_field.h>
 
 namespace sgf::stereo {
 namespace {
@@ -69,17 +72,26 @@ double ShareValid(const MeshStereoResult& result) {
 
 class MeshStereoTest : public ::testing::TestWithParam<const char*> {};
 
-TEST_P(MeshStereoTest, FindsPlanes) {
+TEST_P(MeshStereoTest, FindsSlantedPlanes) {
   const std::vector<std::function<double(int, int)>> planes{
-      [](int, int) { return 6.4; },
       [](int x, int y) { return 4 + 0.06 * x + 0.02 * y; },
       [](int x, int y) { return 12 - 0.05 * x - 0.03 * y; },
   };
   for (size_t i = 0; i < planes.size(); ++i) {
     const auto [left, right] = PairWith({120, 90}, planes[i], i + 1);
-    const MeshStereoResult grey = MeshStereo(With(GetParam())).Match(left, right);
-    EXPECT_LT(MeanError(grey.disparity, planes[i]), 0.25) << "plane " << i;
-    EXPECT_GT(ShareValid(grey), 0.8) << "plane " << i;
+    const MeshStereoResult result = MeshStereo(With(GetParam())).Match(left, right);
+    EXPECT_LT(MeanError(result.disparity, planes[i]), 0.25) << "plane " << i;
+    EXPECT_GT(ShareValid(result), 0.8) << "plane " << i;
+  }
+}
+
+TEST_P(MeshStereoTest, FindsPlanesThatFaceTheCamera) {
+  // Costs interpolated linearly are least at integer disparities, to which such planes are drawn.
+  for (const auto& [disparity, most] : {std::pair{7.0, 0.05}, {6.2, 0.25}, {6.4, 0.45}}) {
+    const auto [left, right] = ShiftedPair({120, 90}, disparity, 1);
+    const MeshStereoResult result = MeshStereo(With(GetParam())).Match(left, right);
+    EXPECT_LT(MeanError(result.disparity, [d = disparity](int, int) { return d; }), most);
+    EXPECT_GT(ShareValid(result), 0.8);
   }
 }
 
@@ -93,13 +105,82 @@ TEST_P(MeshStereoTest, FindsPlanesInColour) {
 TEST_P(MeshStereoTest, FindsNegativeDisparities) {
   MeshStereoOptions options = With(GetParam());
   options.min_disparity = -12;
-  const auto [left, right] = ShiftedPair({120, 90}, -6.4, 5);
+  const auto [left, right] = ShiftedPair({120, 90}, -6.1, 5);
   const MeshStereoResult result = MeshStereo(options).Match(left, right);
-  EXPECT_LT(MeanError(result.disparity, [](int, int) { return -6.4; }), 0.25);
+  EXPECT_LT(MeanError(result.disparity, [](int, int) { return -6.1; }), 0.25);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, MeshStereoTest, ::testing::Values("sgf", "sad", "census_sobel"),
                          [](const auto& test) { return std::string(test.param); });
+
+TEST(MeshStereo, BothImagesStartNearTheirDisparities) {
+  const auto plane = [](int x, int y) { return 4 + 0.06 * x + 0.02 * y; };
+  const auto [left, right] = PairWith({120, 90}, plane, 1);
+  MeshStereoOptions options = With("sgf");
+  options.rounds = 0;
+  const MeshStereoResult result = MeshStereo(options).Match(left, right);
+  EXPECT_LT(MeanError(result.disparity, plane), 0.4);
+  EXPECT_GT(ShareValid(result), 0.8);
+}
+
+TEST(CheckLeftRight, ConfirmsWhatThePartnerAgreesWith) {
+  const cv::Mat1f left = (cv::Mat1f(1, 6) << 1, 1, 2.25F, 3, 0, 9);
+  const cv::Mat1f right = (cv::Mat1f(1, 6) << 2.5F, 0, 0, 0, 1.25F, 0);
+  EXPECT_EQ(cv::norm(internal::CheckLeftRight(left, right, 1.5),
+                     cv::Mat1b((cv::Mat1b(1, 6) << 0, 255, 255, 255, 255, 0)), cv::NORM_INF),
+            0);
+  EXPECT_EQ(cv::countNonZero(internal::CheckLeftRight(left, right, 1)), 2);
+}
+
+TEST(MedianOfInvalid, TakesTheMedianOfPixelsOfTheSameColour) {
+  const cv::Size size(31, 21);
+  cv::Mat1b image(size, 10), valid(size, 255);
+  image.colRange(16, 31) = 250;
+  cv::Mat1f disparity(size, -3.0F);
+  disparity.colRange(16, 31) = 6.25F;
+  const cv::Mat1f expected = disparity.clone();
+  for (const cv::Point hole : {cv::Point(15, 10), {16, 10}, {0, 0}, {30, 20}}) {
+    valid(hole) = 0;
+    disparity(hole) = 2;
+  }
+  disparity(5, 5) = 1;  // valid: stays as it is
+  MeshStereoOptions options = With("sgf");
+  options.min_disparity = -4;
+  options.median_window = 0;
+  const cv::Mat1f before = disparity.clone();
+  internal::MedianOfInvalid(image, valid, options, disparity);
+  EXPECT_EQ(cv::countNonZero(disparity != before), 0);
+  options.median_window = 9;
+  internal::MedianOfInvalid(image, valid, options, disparity);
+  EXPECT_EQ(disparity(5, 5), 1);
+  disparity(5, 5) = expected(5, 5);
+  EXPECT_EQ(cv::countNonZero(disparity != expected), 0);
+}
+
+TEST(PlaneField, UnconfirmedTrianglesTakeTheNearestPlaneOfTheSameColour) {
+  // Three stripes: of the two outer ones, which differ, the middle one resembles the left.
+  const cv::Size size(120, 60);
+  cv::Mat1b image(size, 50), valid(size, 255);
+  image.colRange(80, 120) = 220;
+  valid.colRange(40, 80) = 0;
+  cv::Mat1f guess(size, 5.0F);
+  guess.colRange(40, 80) = 9;
+  guess.colRange(80, 120) = 12;
+  MeshStereoOptions options = With("sad");
+  options.window = 3;  // each triangle starts from the stripe that it lies in
+  const internal::CostVolume volume(internal::PrepareCostRows(image, image, options, 9), size,
+                                    options, 0.5);
+  const TriangleMesh mesh = BuildMesh(image, options.mesh);
+  std::vector<cv::Point> centres;
+  for (int i = 0; i < mesh.size(); ++i) centres.emplace_back(mesh.Barycentre(i));
+  const internal::SupportWindows windows(image, centres, options.window, options.gamma, 1);
+  internal::PlaneField field(volume.Left(), mesh, windows, image, options, 1);
+  field.Initialise(guess);
+  field.FillUnconfirmed(valid);
+  const cv::Mat1f found = internal::Render(mesh, field.planes(), 0, 16);
+  EXPECT_NEAR(cv::norm(found.colRange(48, 72), cv::Mat1f(60, 24, 5.0F), cv::NORM_INF), 0, 0.1);
+  EXPECT_NEAR(cv::mean(found.colRange(90, 120))[0], 12, 0.1);
+}
 
 void ExpectSame(const MeshStereoResult& a, const MeshStereoResult& b) {
   EXPECT_EQ(cv::countNonZero(a.disparity != b.disparity), 0);
@@ -180,7 +261,6 @@ TEST(MeshStereo, SplitsTheMeshAtStepsOnly) {
   EXPECT_EQ(Places(split), BuildMesh(scene.left, {}).vertices.size());
   EXPECT_GE(split.vertices.size(), Places(split) + 10);
 
-  // The columns that only the left image shows are left out of the range that may be wrong.
   const auto [left, right] = ShiftedPair({120, 90}, 5, 8);
   const DisparityMesh whole = MeshStereo(With("sgf")).Match(left, right).mesh;
   EXPECT_EQ(whole.vertices.size(), Places(whole));
@@ -229,7 +309,7 @@ TEST(MeshStereo, IsDefinedForImagesOfAnySize) {
     for (const int most : {1, 8}) {
       SCOPED_TRACE(testing::Message() << size << ' ' << most);
       const cv::Mat1b left = TexturedImage(size, 1), right = TexturedImage(size, 2);
-      for (const char* metric : {"sgf", "sad", "census_sobel"}) {
+      for (const char* metric : {"sgf", "sad", "census_sobel", "zncc"}) {
         const MeshStereoOptions options = With(metric, std::min(most, size.width));
         ExpectDefined(options, left, right);
         ExpectDefined(options, Tinted(left), Tinted(right));
