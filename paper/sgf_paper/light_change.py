@@ -19,7 +19,13 @@ from sgf_paper.config import LightChange, TableBlock
 
 QUANTITIES = ["mean_px", "bad2_pct", "invalid_pct", "within2_pct"]
 KEYS = ["dataset", "region", "case", "matcher", "cost"]
-CSV_COLUMNS = [*KEYS, "scenes", *(f"{q}_{when}" for q in QUANTITIES for when in ("before", "after", "rise"))]
+CSV_COLUMNS = [
+    *KEYS,
+    "scenes",
+    "mean_px_median_rise",
+    *(f"{q}_{when}" for q in QUANTITIES for when in ("before", "after", "rise")),
+]
+LIMIT_PX = 10.0  # of the figure's bars
 COLOURS = {**style.COLOURS, "census": style.EXTRA_COLOURS[1]}
 
 
@@ -89,6 +95,8 @@ def _case_lines(case: Case) -> list[dict]:
     for (region, column), scenes in joined.groupby(["region", "column"], sort=False):
         line = {"region": region, "case": case.name, "cost": column}
         line["scenes"] = int(scenes["mean_px_after"].notna().sum())
+        rises = (scenes["mean_px_after"] - scenes["mean_px_before"]).dropna()
+        line["mean_px_median_rise"] = float("nan") if rises.empty else rises.median()
         for quantity in QUANTITIES:
             values = compare(scenes[f"{quantity}_before"], scenes[f"{quantity}_after"])
             line |= {f"{quantity}_{when}": value for when, value in values.items()}
@@ -115,15 +123,18 @@ def make_table(experiment: LightChange, raw: Path, datasets: list[str]) -> pd.Da
     return table.loc[ranks.sort_values(list(order), kind="stable").index].reset_index(drop=True)
 
 
+def _format(value: float) -> str:
+    return text.format_number(round(value, 2) + 0.0, 2) or "–"  # + 0: no "-0.00"
+
+
 def _row(line: pd.Series, least: float) -> dict:
     values = {
-        quantity: [
-            text.format_number(line[f"{quantity}_{when}"], 2) or "–" for when in ("before", "after", "rise")
-        ]
+        quantity: [_format(line[f"{quantity}_{when}"]) for when in ("before", "after", "rise")]
         for quantity in QUANTITIES
     }
     if line["mean_px_rise"] == least:
         values["mean_px"][2] = f"**{values['mean_px'][2]}**"
+    values["mean_px"].append(_format(line["mean_px_median_rise"]))
     return {"matcher": line["matcher"], "cost": line["cost"], "scenes": line["scenes"], "values": values}
 
 
@@ -137,23 +148,24 @@ def make_blocks(table: pd.DataFrame) -> list[dict]:
     return blocks
 
 
+def _label(axis: plt.Axes, label: str, place: float, height: float, shift: int, colour: str) -> None:
+    """Text centred at a place, some points above or below a height."""
+    where = {"textcoords": "offset points", "ha": "center", "annotation_clip": False}
+    axis.annotate(label, (place, height), (0, shift), color=colour, **where)
+
+
 def _draw_panel(axis: plt.Axes, lines: pd.DataFrame) -> None:
     """Two bars a column, before and after, the rise above them."""
     for place, line in enumerate(lines.itertuples()):
-        colour = COLOURS[line.cost]
-        axis.bar(place - 0.2, line.mean_px_before, 0.38, color=colour, alpha=0.4)
-        axis.bar(place + 0.2, line.mean_px_after, 0.38, color=colour)
-        if line.mean_px_rise == line.mean_px_rise:
-            top = max(line.mean_px_before, line.mean_px_after)
-            axis.annotate(
-                f"{line.mean_px_rise:+.2f}", (place, top), (0, 2), textcoords="offset points", ha="center"
-            )
-        axis.annotate(
-            f"{line.invalid_pct_after:.0f} %", (place, 0), (0, -21), textcoords="offset points",
-            ha="center", color="#555555", annotation_clip=False,
-        )  # fmt: skip
+        before, after = (min(value, LIMIT_PX) for value in (line.mean_px_before, line.mean_px_after))
+        axis.bar(place - 0.2, before, 0.38, color=COLOURS[line.cost], alpha=0.4)
+        axis.bar(place + 0.2, after, 0.38, color=COLOURS[line.cost])
+        rise = round(line.mean_px_rise, 2) + 0.0  # + 0: no "-0.00"
+        _label(axis, f"{rise:+.2f}", place, max(before, after), 2, "black")
+        _label(axis, f"{line.invalid_pct_after:.0f} %", place, 0, -21, "#555555")
     axis.set_xticks(range(len(lines)), lines["cost"])
     axis.tick_params(axis="x", length=0)
+    axis.margins(y=0.14)
     axis.grid(axis="y", alpha=0.3, linewidth=0.5)
     axis.set_axisbelow(True)
 
@@ -162,7 +174,7 @@ def draw(experiment: LightChange, table: pd.DataFrame) -> plt.Figure:
     """Mean errors before and after on the table's first data set and region: a row of panels per
     case that has a before, in it the matchers."""
     shown = table[(table["dataset"] == table["dataset"][0]) & (table["region"] == table["region"][0])]
-    shown = shown.groupby("case").filter(lambda part: part["mean_px_rise"].notna().any())
+    shown = shown[shown["mean_px_rise"].notna()]
     cases, matchers = shown["case"].unique(), shown["matcher"].unique()
     size = (3.6 * len(matchers), 2.0 * len(cases) + 0.8)
     figure, axes = plt.subplots(
@@ -172,15 +184,15 @@ def draw(experiment: LightChange, table: pd.DataFrame) -> plt.Figure:
         for axis, matcher in zip(row, matchers):
             lines = shown[(shown["case"] == case) & (shown["matcher"] == matcher)]
             _draw_panel(axis, lines)
-            axis.margins(y=0.12)
             scenes = lines["scenes"].max()
             title = f"{text.matcher_title(matcher)}: {case}, {scenes} scene{'s' if scenes != 1 else ''}"
             axis.set_title(title)
         row[0].set_ylabel("mean error, px")
     first = table.iloc[0]
     figure.suptitle(
-        f"{experiment.title}: {first['dataset']}, {first['region']}. Pale: unchanged; full: changed;"
-        " above: rise; below: pixels left unmatched after the change"
+        f"{experiment.title}: {first['dataset']}, {first['region']}\n"
+        f"pale: unchanged; full: changed; above: rise, px; bars end at {LIMIT_PX:g} px;"
+        " below: pixels left unmatched after the change"
     )
     return figure
 

@@ -125,3 +125,29 @@ def test_sgf_is_first_on_kitti(quantity):
     table = require_dataset(read(TABLES, "table2"), "kitti2015")
     of_cost = values(table, "noc", quantity)
     assert of_cost["sgf"] < of_cost[OTHERS].min()
+
+
+@pytest.mark.parametrize("quantity", ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct"])
+@pytest.mark.parametrize("region", ["all", "noc"])
+def test_sgf_is_first_of_the_mesh_stereo_costs_on_middlebury(region, quantity):
+    table = require_dataset(read(TABLES, "table1"), "middlebury2014_q")
+    of_cost = values(table, region, quantity, "stereo_mesh")
+    assert of_cost["sgf"] < of_cost[OTHERS].min()
+
+
+@pytest.mark.parametrize(
+    "region, quantity, bound",
+    [("all", "mean_px", 2.41), ("all", "bad2_pct", 15.19), ("noc", "mean_px", 1.71), ("noc", "bad2_pct", 10.83)],
+)
+def test_mesh_stereo_is_no_worse_than_its_public_implementation(region, quantity, bound):
+    """Measured on the same 15 pairs, with the same cost."""
+    table = require_dataset(read(TABLES, "table1"), "middlebury2014_q")
+    assert values(table, region, quantity, "stereo_mesh")["orig"] <= bound
+
+
+@pytest.mark.parametrize("quantity", ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct"])
+@pytest.mark.parametrize("region", ["all", "noc"])
+def test_filled_semi_global_matching_over_sgf_beats_opencvs(region, quantity):
+    table = require_dataset(read(TABLES, "table1"), "middlebury2014_q")
+    of_cost = values(table, region, quantity, "stereo_sgm")
+    assert of_cost["sgf_filled"] < of_cost["orig_filled"]

@@ -68,7 +68,9 @@ class StereoSweepTest : public ::testing::Test {
 
   // The lines of the CSV file as maps from its header's names.
   std::vector<std::map<std::string, std::string>> Run(const StereoSweepRequest& request) const {
-    RunStereoSweep(request, {.name = "walls"}, dir_.path() / "data");
+    CatalogueEntry entry;
+    entry.name = request.dataset;
+    RunStereoSweep(request, entry, dir_.path() / "data");
     std::istringstream csv(ReadFile(request.output));
     std::string header, line;
     std::getline(csv, header);

@@ -106,9 +106,10 @@ def test_the_document_marks_the_least_rise(experiment, lines):
     blocks = light_change.make_blocks(lines.reset_index())
     assert [(b["region"], b["case"]) for b in blocks[:3]] == [("all", "bL"), ("all", "c"), ("all", "dim")]
     rows = {row["cost"]: row["values"]["mean_px"] for row in blocks[2]["rows"]}
-    assert rows["sgf"][2] == "**0.12**" and rows["orig"][2] == "0.83"
+    assert rows["sgf"][2:] == ["**0.12**", "0.00"]  # of rises 1, 0, -0.5 and 0
+    assert rows["orig"][2:] == ["0.83", "0.00"]  # of rises 3, 0 and -0.5
     alone = {row["cost"]: row["values"]["mean_px"] for row in blocks[1]["rows"]}
-    assert alone["sgf"] == ["–", "3.40", "–"]
+    assert alone["sgf"] == ["–", "3.40", "–", "–"]
 
 
 def test_the_figure_has_two_bars_a_column_and_no_case_without_before(experiment, lines):
@@ -123,6 +124,16 @@ def test_the_figure_has_two_bars_a_column_and_no_case_without_before(experiment,
     plt.close(figure)
 
 
+def test_bars_end_at_the_limit_and_say_how_far_they_would_go(experiment, lines):
+    table = lines.reset_index()
+    table.loc[table["cost"] == "orig", "mean_px_after"] = 50.0
+    table.loc[table["cost"] == "orig", "mean_px_rise"] = 47.0
+    figure = light_change.draw(experiment, table)
+    assert max(bar.get_height() for bar in figure.axes[0].patches) == light_change.LIMIT_PX
+    assert "+47.00" in [label.get_text() for label in figure.axes[0].texts]
+    plt.close(figure)
+
+
 def test_files_and_summary(experiment, table, raw, datasets, tmp_path, monkeypatch):
     experiments = {"table9": table, "light_change": experiment}
     monkeypatch.setattr(config, "load_experiment", experiments.get)
@@ -134,7 +145,7 @@ def test_files_and_summary(experiment, table, raw, datasets, tmp_path, monkeypat
     document = (tmp_path / "light_change.md").read_text()
     assert "StereoBM: window 9, uniqueness 10 (orig: uniqueness 20)." in document
     assert "- c: as the data set's authors took it, without a pair to compare with" in document
-    row = "| StereoBM | sgf | 1 | 1.90 | 2.40 | **0.50** | 38.00 | 48.00 | 10.00 | 30.00 | 30.00 | 0.00 |"
+    row = "| StereoBM | sgf | 1 | 1.90 | 2.40 | **0.50** | 0.50 | 38.00 | 48.00 | 10.00 | 30.00 | 30.00 | 0.00 |"
     assert row in document
     assert (tmp_path / "light_change.png").stat().st_size > 5000
     lines = summary._light_change_lines(tmp_path / "light_change.csv")
