@@ -242,7 +242,7 @@ def test_bad_truth_is_named_and_leaves_nothing_behind(pair, tmp_path):
         (["--method", "mesh", "--uniqueness", "5"], ["uniqueness_pct", "mesh"]),
         (["--method", "mesh", "--window", "8"], ["window", "8"]),
         (["--method", "sgm", "--texture-threshold", "5"], ["texture_threshold", "sgm"]),
-        (["--method", "sgm", "--p1", "100"], ["p1", "100"]),
+        (["--method", "sgm", "--p1", "125"], ["p1", "125"]),
         (["--method", "sgm", "--max-disp", "101"], ["num_disparities", "101", "100"]),
         (["--method", "mesh", "--max-disp", "101"], ["num_disparities", "101", "100"]),
         (["--layout", "kitti2015"], ["--layout"]),
