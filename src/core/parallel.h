@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
 
 namespace sgf {
@@ -11,5 +12,14 @@ int ResolveThreads(int requested);
 /// Calls body(i) once for every i in [0, count) on at most `threads` threads (0: all cores) and
 /// returns when all are done. The split into i must not depend on `threads` where results do.
 void ParallelFor(int count, int threads, const std::function<void(int)>& body);
+
+/// ParallelFor() for small bodies: they are handed to threads in batches of a fixed size.
+template <class Body>
+void ParallelForBatches(int count, int threads, const Body& body) {
+  constexpr int kBatch = 32;
+  ParallelFor((count + kBatch - 1) / kBatch, threads, [&](int batch) {
+    for (int i = batch * kBatch; i < std::min(count, (batch + 1) * kBatch); ++i) body(i);
+  });
+}
 
 }  // namespace sgf

@@ -21,7 +21,8 @@ struct MeshOptions {
           "of segments: weight of distance against colour (SLIC's m)");
     visit("tolerance_px", tolerance_px, "px",
           "largest distance between a segment's outline and the mesh vertices' polygon");
-    visit("spacing_px", spacing_px, "px", "least distance between vertices");
+    visit("spacing_px", spacing_px, "px",
+          "vertices nearer than this to one kept before are dropped");
   }
 };
 
@@ -46,7 +47,7 @@ struct TriangleMesh {
 /// Cuts an image into triangles that follow its edges, as MeshStereo does (Zhang et al., ICCV
 /// 2015): SLIC over-segmentation, outlines of the segments as polygons, Delaunay triangulation of
 /// the polygons' vertices. An image smaller than a segment becomes two triangles.
-/// @param image 8-bit, one channel or BGR, at least 2 x 2.
+/// @param image 8-bit, one channel or BGR, not empty.
 TriangleMesh BuildMesh(const cv::Mat& image, const MeshOptions& options);
 
 }  // namespace sgf::stereo

@@ -61,9 +61,7 @@ cv::Mat1i Quantise(const cv::Mat1f& disparity, const MeshStereoOptions& options)
 void AddWindow(const SupportWindows& windows, int i, const cv::Mat1i& bins, Histogram& histogram) {
   const cv::Point centre = windows.Centre(i);
   const int radius = windows.window() / 2;
-  const cv::Rect inside =
-      cv::Rect(centre - cv::Point(radius, radius), centre + cv::Point(radius + 1, radius + 1)) &
-      cv::Rect({}, bins.size());
+  const cv::Rect inside = WindowInside(centre, radius, bins.size());
   for (int y = inside.y; y < inside.br().y; ++y)
     for (int x = inside.x; x < inside.br().x; ++x)
       if (const int weight = windows.Weight(i, x, y)) histogram.Add(bins(y, x), weight);

@@ -12,6 +12,9 @@ namespace sgf::stereo {
 
 /// Parameters of MeshStereo. Costs are in units in which the mean cost over a pair's pixels and
 /// disparities is 64, whatever the dissimilarity, so that one set of parameters serves all.
+///
+/// Defaults without a source were found on the quarter-size Middlebury 2014 pairs with census_sobel
+/// as the cost.
 struct MeshStereoOptions : CostOptions {
   int window = 35;      // MeshStereo's public implementation
   double gamma = 20;    // between PatchMatch Stereo's 10 and MeshStereo's 30
@@ -30,7 +33,7 @@ struct MeshStereoOptions : CostOptions {
   double split_least = 0.2;
   double alignment_weight = 0.5;
   double island_share = 1.0 / 30;
-  double left_right_max = 1;  // MeshStereo, Sec. 4
+  double left_right_max = 1;  // as in block matching
   int median_window = 35;     // MeshStereo's public implementation
   int seed = 1;
 

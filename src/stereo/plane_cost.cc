@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace sgf::stereo::internal {
 namespace HWY_NAMESPACE {
 
-constexpr int kSteps = 32;        // of interpolation in a px
+constexpr int kSteps = kStepsPerPx;
 constexpr int kRowsPerCheck = 5;  // between looks at the limit
 
 using D16 = VectorTag<int16_t>;
@@ -152,7 +152,6 @@ HWY_EXPORT(WindowSum);
 namespace {
 
 constexpr int kSide = 64;  // columns that windows may read outside the image on either side
-constexpr int kStepsOnce = 32;
 
 // out[k * stride + x] = in[x * count + k], in blocks that stay in the cache.
 void Transpose(const uint8_t* in, int width, int count, uint8_t* out, ptrdiff_t stride) {
@@ -277,14 +276,12 @@ template <int kChannels>
 int Weigh(const cv::Mat& image, cv::Point centre, int radius, const std::vector<uint8_t>& table,
           int stride, uint8_t* weights) {
   const uint8_t* middle = image.ptr(centre.y) + kChannels * centre.x;
-  const int x_begin = std::max(0, centre.x - radius);
-  const int x_end = std::min(image.cols, centre.x + radius + 1);
+  const cv::Rect inside = WindowInside(centre, radius, image.size());
   int total = 0;
-  for (int y = std::max(0, centre.y - radius); y < std::min(image.rows, centre.y + radius + 1);
-       ++y) {
+  for (int y = inside.y; y < inside.br().y; ++y) {
     const uint8_t* row = image.ptr(y);
     uint8_t* out = weights + (y - centre.y + radius) * stride - (centre.x - radius);
-    for (int x = x_begin; x < x_end; ++x) {
+    for (int x = inside.x; x < inside.br().x; ++x) {
       out[x] = table[ColourDifference<kChannels>(middle, row + kChannels * x)];
       total += out[x];
     }
@@ -303,18 +300,15 @@ SupportWindows::SupportWindows(const cv::Mat& image, const std::vector<cv::Point
       totals_(centres.size()) {
   const std::vector<uint8_t> table = WeightTable(gamma);
   const auto weigh = image.channels() == 1 ? Weigh<1> : Weigh<3>;
-  constexpr int kBatch = 256;
-  const int count = static_cast<int>(centres.size());
-  ParallelFor((count + kBatch - 1) / kBatch, threads, [&](int batch) {
-    for (int i = batch * kBatch; i < std::min(count, (batch + 1) * kBatch); ++i)
-      totals_[i] = weigh(image, centres[i], window / 2, table, stride_,
-                         weights_.data() + static_cast<size_t>(i) * window * stride_);
+  ParallelForBatches(static_cast<int>(centres.size()), threads, [&](int i) {
+    totals_[i] = weigh(image, centres[i], window / 2, table, stride_,
+                       weights_.data() + static_cast<size_t>(i) * window * stride_);
   });
 }
 
 float PlaneCost(const VolumeView& view, const SupportWindows& windows, int i, const Plane& plane,
                 float limit) {
-  const double unit = static_cast<double>(kStepsOnce) * windows.TotalWeight(i);
+  const double unit = static_cast<double>(kStepsPerPx) * windows.TotalWeight(i);
   const double most = std::ceil(static_cast<double>(limit) * unit);
   constexpr double kNoLimit = 1e18;
   const auto limit_sum = static_cast<uint64_t>(std::clamp(most, 0.0, kNoLimit));

@@ -24,6 +24,14 @@ struct Plane {
   }
 };
 
+constexpr int kStepsPerPx = 32;  ///< of interpolation between disparities
+
+/// The pixels within `radius` columns and rows of `centre` that lie inside an image.
+inline cv::Rect WindowInside(cv::Point centre, int radius, cv::Size image) {
+  const cv::Point reach(radius, radius);
+  return cv::Rect(centre - reach, centre + reach + cv::Point(1, 1)) & cv::Rect({}, image);
+}
+
 /// How one of the two images sees the cost volume: the cost of its pixel (x, y) at disparity index
 /// k stands at origin[y * row_stride + k * index_stride + x].
 struct VolumeView {
@@ -88,8 +96,8 @@ class SupportWindows {
   std::vector<int> totals_;
 };
 
-/// Mean byte cost of window i under a plane, interpolated between disparities in steps of 1/32 px;
-/// disparities beyond the volume are cut to its range.
+/// Mean byte cost of window i under a plane, interpolated between disparities in steps of 1 /
+/// kStepsPerPx; disparities beyond the volume are cut to its range.
 /// @param limit the caller discards results of this or more: the sum may stop early there.
 float PlaneCost(const VolumeView& view, const SupportWindows& windows, int i, const Plane& plane,
                 float limit);

@@ -18,14 +18,9 @@ namespace {
 constexpr int kNone = TriangleMesh::kNone;
 constexpr float kSteepest = 3;  // slope of a plane
 
-// Runs body(i) over `items` in batches.
 template <class Body>
 void ForEach(const std::vector<int>& items, int threads, const Body& body) {
-  constexpr int kBatch = 32;
-  const int count = static_cast<int>(items.size());
-  ParallelFor((count + kBatch - 1) / kBatch, threads, [&](int batch) {
-    for (int n = batch * kBatch; n < std::min(count, (batch + 1) * kBatch); ++n) body(items[n]);
-  });
+  ParallelForBatches(static_cast<int>(items.size()), threads, [&](int n) { body(items[n]); });
 }
 
 // Mean colours of the triangles; of those without a pixel, the colour at the barycentre.
@@ -72,9 +67,7 @@ std::vector<FitPoint> PointsAround(const cv::Mat1f& guess, const SupportWindows&
   constexpr int kRadius = 10;
   const cv::Point centre = windows.Centre(i);
   const int radius = std::min(kRadius, windows.window() / 2);
-  const cv::Rect around(centre - cv::Point(radius, radius),
-                        centre + cv::Point(radius + 1, radius + 1));
-  const cv::Rect inside = around & cv::Rect({}, guess.size());
+  const cv::Rect inside = WindowInside(centre, radius, guess.size());
   std::vector<FitPoint> points;
   for (int y = inside.y; y < inside.br().y; ++y)
     for (int x = inside.x; x < inside.br().x; ++x)
@@ -153,9 +146,7 @@ void PlaneField::CompareColours(const cv::Mat& image) {
 }
 
 void PlaneField::Initialise(const cv::Mat1f& guess) {
-  std::vector<int> all(mesh_.size());
-  std::iota(all.begin(), all.end(), 0);
-  ForEach(all, options_.threads, [&](int i) {
+  ParallelForBatches(mesh_.size(), options_.threads, [&](int i) {
     planes_[i] = FitPlane(guess, i);
     data_[i] = PlaneCost(view_, windows_, i, planes_[i], std::numeric_limits<float>::max());
     for (int k = 0; k < 3; ++k) aligned_[i][k] = planes_[i].At(Corner(i, k).x, Corner(i, k).y);
@@ -404,9 +395,8 @@ void PlaneField::Dissolve(const std::vector<int>& members, const std::vector<int
 }
 
 void PlaneField::Align() {
-  std::vector<int> all(fans_.size());
-  for (size_t v = 0; v < fans_.size(); ++v) all[v] = static_cast<int>(v);
-  ForEach(all, options_.threads, [&](int v) { AlignVertex(fans_[v]); });
+  ParallelForBatches(static_cast<int>(fans_.size()), options_.threads,
+                     [&](int v) { AlignVertex(fans_[v]); });
 }
 
 // Corner disparities x of the triangles around a vertex: the minimum of

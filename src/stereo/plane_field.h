@@ -25,9 +25,9 @@ namespace sgf::stereo::internal {
 ///     Delta_e^2)
 ///
 /// at z = (tau_e / (tau_e + Delta_e^2))^2 (Black and Rangarajan, IJCV 1996). tau_e, the price of a
-/// split, is lower where the triangles' colours differ: splits follow intensity edges. MeshStereo
-/// has a splitting probability for each vertex and infers it by mean field; here it belongs to a
-/// pair of neighbours and has a closed form.
+/// split, is lower where the triangles' colours differ: splits follow intensity edges. In
+/// MeshStereo splitting probabilities belong to vertices; here each pair of neighbours has one, in
+/// closed form.
 class PlaneField {
  public:
   /// @param mesh, windows, options have to outlive this.

@@ -14,8 +14,8 @@ namespace sgf::stereo::internal {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// At most 32 bytes, with AVX-512 too: the kernels read the right image at every offset, and a load of
-// 64 bytes that is not aligned always touches two cache lines. Measured on a machine that splits
+// At most 32 bytes, with AVX-512 too: the kernels read the right image at every offset, and a load
+// of 64 bytes that is not aligned always touches two cache lines. Measured on a machine that splits
 // 64-byte operations anyway (Zen 4): 128 disparities, 9 x 9, 1.9 times cv::StereoBM with 64 bytes.
 template <class T>
 using VectorTag = hn::CappedTag<T, 32 / sizeof(T)>;
