@@ -1,0 +1,133 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include <sgf/alignment/direct_alignment.h>
+#include <sgf/alignment/point_selection.h>
+#include <sgf/core/camera.h>
+#include <sgf/core/inertial.h>
+#include <sgf/core/se3.h>
+#include <sgf/stereo/block_matcher.h>
+
+/// Key-frame odometry by direct image alignment, from rectified stereo pairs or from grey images
+/// with depth.
+namespace sgf::odometry {
+
+/// Parameters of Odometry.
+struct OdometryOptions {
+  stereo::BlockMatcherOptions matcher;
+  alignment::SelectionOptions selection;
+  alignment::AlignmentOptions alignment;
+  double min_depth_m = 0.1;
+  double max_depth_m = 100;
+  double keyframe_overlap = 0.7;
+  double keyframe_inliers = 0.6;
+  int relocation_keyframes = 5;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("matcher", matcher, "", "block matching that depth comes from");
+    visit("selection", selection, "", "pixels of a key-frame that are tracked");
+    visit("alignment", alignment, "", "direct image alignment");
+    visit("min_depth_m", min_depth_m, "m", "nearest depth that is used");
+    visit("max_depth_m", max_depth_m, "m", "farthest depth that is used");
+    visit("keyframe_overlap", keyframe_overlap, "",
+          "a new key-frame is made when fewer of its points are in view");
+    visit("keyframe_inliers", keyframe_inliers, "",
+          "a new key-frame is made when the share of inliers falls below");
+    visit("relocation_keyframes", relocation_keyframes, "",
+          "last key-frames that a lost camera is aligned with");
+  }
+};
+
+/// The cameras of an odometry: an ideal pinhole camera and, for rectified stereo, its twin.
+struct Rig {
+  Camera camera;          ///< of the left (or only) image, without distortion
+  double baseline_m = 0;  ///< from the left to the right camera along +x; 0 with depth images
+};
+
+/// What became of a frame.
+enum class TrackingState {
+  kInitialised,  ///< the first frame, or the first after being lost without relocation
+  kTracked,
+  kLost,         ///< the pose is a prediction and not to be believed
+};
+std::span<const std::pair<const char*, TrackingState>> EnumNames(TrackingState);
+
+/// Time spent on a frame, s.
+struct StageTimes {
+  double pyramid_s = 0;
+  double alignment_s = 0;
+  double depth_s = 0;      ///< stereo matching; 0 where no key-frame was made
+  double selection_s = 0;
+  double total_s = 0;
+};
+
+/// What is known after a frame. World is the first frame's camera (x right, y down, z forward).
+struct FrameResult {
+  std::int64_t time_ns = 0;
+  TrackingState state = TrackingState::kLost;
+  SE3 T_world_cam;
+  /// Of the motion since the key-frame, in the tangent of T_cam_keyframe (left perturbation,
+  /// translation in m before rotation in rad).
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  int keyframe = -1;        ///< index of the key-frame it was aligned with, counted from 0
+  bool new_keyframe = false;  ///< this frame has become one
+  double overlap = 0;       ///< share of the key-frame's points that are in view
+  double inlier_share = 0;  ///< of the residuals in view
+  double condition = 0;     ///< of the normal equations
+  int iterations = 0;
+  StageTimes times;
+};
+
+/// A key-frame: its pose and the points that later frames are aligned with.
+struct Keyframe {
+  std::int64_t time_ns = 0;
+  SE3 T_world_cam;
+  std::vector<Eigen::Vector3d> points;  ///< in camera coordinates, m
+  std::vector<Eigen::Vector2f> pixels;  ///< of the points, px
+  std::vector<float> grey;              ///< of the points, grey levels
+};
+
+/// Visual odometry against the last key-frame. Frames are handed over one at a time, in the order of
+/// their times; the pose is that at frame time and is not changed later. Same input, same bits.
+class Odometry {
+ public:
+  /// @throws Error for a camera with distortion or out of range, or an option out of range.
+  Odometry(const Rig& rig, const OdometryOptions& options);
+  ~Odometry();
+  Odometry(Odometry&&) noexcept;
+  Odometry& operator=(Odometry&&) noexcept;
+
+  /// Tracks a rectified stereo pair (8-bit grey, of the camera's size).
+  /// @throws Error for images of another size or type, a time not after the last one, or a rig
+  ///   without baseline. The state is as before the call.
+  FrameResult ProcessStereo(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right);
+
+  /// Tracks a grey image with depth.
+  /// @param depth_m depth along the optical axis, m; 0, negative or not finite where unknown.
+  /// @throws Error as ProcessStereo().
+  FrameResult ProcessDepth(std::int64_t time_ns, const cv::Mat& grey, const cv::Mat1f& depth_m);
+
+  /// Takes an angular rate for the prediction of the next frame's rotation.
+  /// @param gyro rad/s in camera coordinates. Samples come in the order of their times; those not
+  ///   after the last frame's time are ignored.
+  void ProcessGyro(std::int64_t time_ns, const Eigen::Vector3d& gyro);
+
+  /// The last key-frame. @throws Error before the first frame.
+  const Keyframe& LastKeyframe() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sgf::odometry
