@@ -15,6 +15,7 @@
 #include <sgf/core/camera.h>
 #include <sgf/core/inertial.h>
 #include <sgf/core/se3.h>
+#include <sgf/odometry/stereo_depth.h>
 #include <sgf/stereo/block_matcher.h>
 
 /// Key-frame odometry by direct image alignment, from rectified stereo pairs or from grey images
@@ -24,6 +25,7 @@ namespace sgf::odometry {
 /// Parameters of Odometry.
 struct OdometryOptions {
   stereo::BlockMatcherOptions matcher;
+  RefinementOptions refinement;
   alignment::SelectionOptions selection;
   alignment::AlignmentOptions alignment;
   double min_depth_m = 0.1;
@@ -31,10 +33,12 @@ struct OdometryOptions {
   double keyframe_overlap = 0.7;
   double keyframe_inliers = 0.6;
   int relocation_keyframes = 5;
+  int lost_frames = 20;
 
   template <class V>
   void VisitFields(V&& visit) {
     visit("matcher", matcher, "", "block matching that depth comes from");
+    visit("refinement", refinement, "", "of the disparities of tracked pixels");
     visit("selection", selection, "", "pixels of a key-frame that are tracked");
     visit("alignment", alignment, "", "direct image alignment");
     visit("min_depth_m", min_depth_m, "m", "nearest depth that is used");
@@ -45,6 +49,8 @@ struct OdometryOptions {
           "a new key-frame is made when the share of inliers falls below");
     visit("relocation_keyframes", relocation_keyframes, "",
           "last key-frames that a lost camera is aligned with");
+    visit("lost_frames", lost_frames, "frames",
+          "after so many lost ones the odometry starts anew at the predicted pose");
   }
 };
 
@@ -75,7 +81,7 @@ struct StageTimes {
 struct FrameResult {
   std::int64_t time_ns = 0;
   TrackingState state = TrackingState::kLost;
-  SE3 T_world_cam;
+  SE3 T_world_cam = {};
   /// Of the motion since the key-frame, in the tangent of T_cam_keyframe (left perturbation,
   /// translation in m before rotation in rad).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
@@ -84,14 +90,15 @@ struct FrameResult {
   double overlap = 0;       ///< share of the key-frame's points that are in view
   double inlier_share = 0;  ///< of the residuals in view
   double condition = 0;     ///< of the normal equations
+  alignment::AlignmentFailure failure = alignment::AlignmentFailure::kNone;  ///< of the last try
   int iterations = 0;
-  StageTimes times;
+  StageTimes times = {};
 };
 
 /// A key-frame: its pose and the points that later frames are aligned with.
 struct Keyframe {
   std::int64_t time_ns = 0;
-  SE3 T_world_cam;
+  SE3 T_world_cam = {};
   std::vector<Eigen::Vector3d> points;  ///< in camera coordinates, m
   std::vector<Eigen::Vector2f> pixels;  ///< of the points, px
   std::vector<float> grey;              ///< of the points, grey levels

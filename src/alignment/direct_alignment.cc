@@ -1,0 +1,459 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <fmt/core.h>
+
+#include <sgf/alignment/direct_alignment.h>
+#include <sgf/alignment/residual_table.h>
+#include <sgf/core/error.h>
+#include <sgf/core/parallel.h>
+
+namespace sgf::alignment {
+namespace {
+
+using Warp = Se3Warp<float>;
+using Input = PixelAtDepth<float>;
+
+constexpr int kBatch = 64;  // points whose sums are taken together, in order
+
+Vector2<float> RayOf(const Camera& camera, const Eigen::Vector2f& pixel) {
+  return {static_cast<float>((pixel.x() - camera.cx) / camera.fx),
+          static_cast<float>((pixel.y() - camera.cy) / camera.fy)};
+}
+
+SE3 Perturbation(const Eigen::Matrix<double, 6, 1>& delta) {
+  return {ExpSO3(delta.tail<3>()), delta.head<3>()};
+}
+
+/// Scale of residuals with `dim` components from the median of their squared norms.
+float MedianScale(std::vector<float>& squared_norms, int dim) {
+  if (squared_norms.empty()) return 1;
+  const auto middle = squared_norms.begin() + static_cast<ptrdiff_t>(squared_norms.size() / 2);
+  std::nth_element(squared_norms.begin(), middle, squared_norms.end());
+  // Median of chi squared with dim degrees of freedom (Wilson and Hilferty).
+  const double d = dim;
+  const double median = d * std::pow(1 - 2 / (9 * d), 3);
+  return static_cast<float>(std::max(std::sqrt(*middle / median), 1e-6));
+}
+
+}  // namespace
+
+class DirectAligner::Engine {
+ public:
+  virtual ~Engine() = default;
+  virtual std::shared_ptr<const Reference> MakeReference(
+      const Pyramid& pyramid, std::span<const ReferencePoint> points) const = 0;
+  virtual AlignmentResult Align(const Reference& reference, const Pyramid& current,
+                                const SE3& guess) const = 0;
+};
+
+template <class Residual>
+class DirectAligner::EngineOf : public Engine {
+  static constexpr int kParameters = 6 + Residual::kExtraParameters;
+  static constexpr int kDim = Residual::kDim;
+  using Equations = NormalEquations<double, kParameters>;
+  using BatchEquations = NormalEquations<float, kParameters>;
+  using Row = typename NormalEquations<float, 6>::Row;
+  using ReferencePixel = typename Residual::template Reference<float>;
+
+  /// Pixels of a level, patch after patch.
+  struct Level {
+    Camera camera;
+    std::vector<Input> inputs = {};
+    std::vector<ReferencePixel> pixels = {};
+    std::vector<Row> rows = {};  ///< [J r 0] with r to be filled in, kDim for each pixel (inverse)
+  };
+
+  struct ReferenceOf : Reference {
+    std::vector<Level> levels;
+    std::vector<Vector2<float>> gradients;  ///< of the finest level's pixels
+    double median_depth = 1;
+    size_t points = 0;  ///< of the finest level
+  };
+
+  struct State {
+    Warp warp;
+    Residual residual;
+  };
+
+ public:
+  EngineOf(const Camera& camera, const AlignmentOptions& options, const Residual& residual)
+      : camera_(camera), options_(options), residual_(residual), offsets_(Offsets(options.pattern)) {}
+
+  std::shared_ptr<const Reference> MakeReference(
+      const Pyramid& pyramid, std::span<const ReferencePoint> points) const override {
+    auto reference = std::make_shared<ReferenceOf>();
+    for (size_t l = 0; l < pyramid.samples.size(); ++l)
+      reference->levels.push_back(MakeLevel(pyramid, static_cast<int>(l), points));
+    const Level& finest = reference->levels.front();
+    reference->points = finest.inputs.size() / offsets_.size();
+    reference->median_depth = MedianDepth(finest.inputs);
+    for (const Input& input : finest.inputs) {
+      const auto at = pyramid.samples[0].Sample(PixelOf(finest.camera, input)).value;
+      reference->gradients.emplace_back(at[kGradientX], at[kGradientY]);
+    }
+    return reference;
+  }
+
+  AlignmentResult Align(const Reference& base, const Pyramid& current,
+                        const SE3& guess) const override {
+    const auto& reference = static_cast<const ReferenceOf&>(base);
+    AlignmentResult result;
+    State state{{camera_, guess}, residual_};
+    RobustLoss<float> loss{options_.loss};
+    for (int l = static_cast<int>(reference.levels.size()) - 1; l >= 0; --l) {
+      const Level& level = reference.levels[l];
+      state.warp = {level.camera, state.warp.T_cur_ref};
+      const auto& image = ImageOf(current, l);
+      loss.scale = Scale(level, image, state);
+      result.iterations += Descend(level, image, loss, state);
+    }
+    loss.scale = Scale(reference.levels[0], ImageOf(current, 0), state);
+    result.T_cur_ref = state.warp.T_cur_ref;
+    if constexpr (Residual::kExtraParameters == 2) {
+      result.alpha = state.residual.alpha;
+      result.beta = state.residual.beta;
+    }
+    Judge(reference, current, state, loss, result);
+    return result;
+  }
+
+ private:
+  static const typename Residual::Channels& ImageOf(const Pyramid& pyramid, int level) {
+    if constexpr (std::is_same_v<typename Residual::Channels, BitPlanes>)
+      return pyramid.bit_planes[level];
+    else
+      return pyramid.samples[level];
+  }
+
+  static Vector2<float> PixelOf(const Camera& camera, const Input& input) {
+    return {static_cast<float>(camera.fx * input.ray.x() + camera.cx),
+            static_cast<float>(camera.fy * input.ray.y() + camera.cy)};
+  }
+
+  static double MedianDepth(const std::vector<Input>& inputs) {
+    if (inputs.empty()) return 1;
+    std::vector<float> depths;
+    for (const Input& input : inputs) depths.push_back(input.inverse_depth);
+    const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
+    std::nth_element(depths.begin(), middle, depths.end());
+    return *middle > 0 ? 1 / *middle : 1;
+  }
+
+  /// Coarser levels have room for fewer points.
+  Level MakeLevel(const Pyramid& pyramid, int l, std::span<const ReferencePoint> points) const {
+    Level level{.camera = LevelCamera(camera_, l)};
+    const auto& image = ImageOf(pyramid, l);
+    for (size_t i = 0; i < points.size(); i += size_t(1) << l)
+      AddPatch(image, points[i], l, level);
+    if (options_.linearization == Linearization::kInverse) LinearizeAtReference(image, level);
+    return level;
+  }
+
+  void AddPatch(const typename Residual::Channels& image, const ReferencePoint& point, int l,
+                Level& level) const {
+    const Eigen::Vector2f centre(static_cast<float>(ToLevel(point.pixel.x(), l)),
+                                 static_cast<float>(ToLevel(point.pixel.y(), l)));
+    for (const Eigen::Vector2f& offset : offsets_)
+      if (!image.template Inside<float>(centre + offset)) return;
+    for (const Eigen::Vector2f& offset : offsets_) {
+      const Eigen::Vector2f pixel = centre + offset;
+      level.inputs.push_back({RayOf(level.camera, pixel), point.inverse_depth});
+      level.pixels.push_back(
+          Residual::template MakeReference<float>(image.template Sample<float>(pixel)));
+    }
+  }
+
+  void LinearizeAtReference(const typename Residual::Channels& image, Level& level) const {
+    const Warp identity(level.camera, SE3{});
+    level.rows.assign(level.inputs.size() * kDim, Row::Zero());
+    for (size_t first = 0; first < level.inputs.size(); first += offsets_.size())
+      LinearizePatch<float>(residual_, image, identity, InputsOf(level, first),
+                            PixelsOf(level, first), [&](size_t k, const auto&, const auto& J) {
+                              for (int d = 0; d < kDim; ++d)
+                                level.rows[(first + k) * kDim + d].template head<6>() =
+                                    J.row(d).template head<6>().transpose();
+                            });
+  }
+
+  std::span<const Input> InputsOf(const Level& level, size_t first) const {
+    return {level.inputs.data() + first, offsets_.size()};
+  }
+  std::span<const ReferencePixel> PixelsOf(const Level& level, size_t first) const {
+    return {level.pixels.data() + first, offsets_.size()};
+  }
+
+  /// Sum over all patches of body(first pixel, batch sums), in batches added up in order.
+  template <class Sum, class Body>
+  std::vector<Sum> OverPatches(const Level& level, const Body& body) const {
+    const int patches = static_cast<int>(level.inputs.size() / offsets_.size());
+    const int batches = (patches + kBatch - 1) / kBatch;
+    std::vector<Sum> sums(batches);
+    ParallelFor(batches, options_.threads, [&](int batch) {
+      for (int p = batch * kBatch; p < std::min(patches, (batch + 1) * kBatch); ++p)
+        body(p * offsets_.size(), sums[batch]);
+    });
+    return sums;
+  }
+
+  float Scale(const Level& level, const typename Residual::Channels& image,
+              const State& state) const {
+    const auto batches = OverPatches<std::vector<float>>(
+        level, [&](size_t first, std::vector<float>& norms) {
+          EvaluatePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
+                               PixelsOf(level, first), [&](size_t, const auto& r) {
+                                 norms.push_back(r.squaredNorm());
+                               });
+        });
+    std::vector<float> all;
+    for (const auto& norms : batches) all.insert(all.end(), norms.begin(), norms.end());
+    return MedianScale(all, kDim);
+  }
+
+  int Descend(const Level& level, const typename Residual::Channels& image,
+              const RobustLoss<float>& loss, State& state) const {
+    Equations last;
+    if (options_.linearization == Linearization::kForward) {
+      return Minimize<kParameters>(
+                 state, [&](const State& s) { return Forward(level, image, loss, s); }, Step,
+                 options_.solver, last)
+          .iterations;
+    }
+    if constexpr (Residual::kInverseCompositional) {
+      return Minimize<kParameters>(
+                 state, [&](const State& s) { return Inverse(level, image, loss, s); }, InverseStep,
+                 options_.solver, last)
+          .iterations;
+    }
+    return 0;
+  }
+
+  static State Step(const State& state, const typename Equations::Parameters& delta) {
+    State next = state;
+    next.warp = {state.warp.camera,
+                 Perturbation(delta.template head<6>()) * state.warp.T_cur_ref};
+    if constexpr (Residual::kExtraParameters == 2)
+      next.residual.Update(delta.template tail<2>());
+    return next;
+  }
+
+  static State InverseStep(const State& state, const typename Equations::Parameters& delta) {
+    State next = state;
+    next.warp = {state.warp.camera,
+                 state.warp.T_cur_ref * Perturbation(delta.template head<6>()).Inverse()};
+    return next;
+  }
+
+  Equations Forward(const Level& level, const typename Residual::Channels& image,
+                    const RobustLoss<float>& loss, const State& state) const {
+    Equations total;
+    for (const BatchEquations& batch : OverPatches<BatchEquations>(
+             level, [&](size_t first, BatchEquations& sum) {
+               LinearizePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
+                                     PixelsOf(level, first),
+                                     [&](size_t, const auto& r, const auto& J) {
+                                       const float s = r.squaredNorm();
+                                       sum.Add(r, J, loss.Weight(s));
+                                       sum.AddCost(0.5 * loss.Rho(s));
+                                     });
+             }))
+      total += batch;
+    return total;
+  }
+
+  Equations Inverse(const Level& level, const typename Residual::Channels& image,
+                    const RobustLoss<float>& loss, const State& state) const {
+    Equations total;
+    for (const BatchEquations& batch : OverPatches<BatchEquations>(
+             level, [&](size_t first, BatchEquations& sum) {
+               EvaluatePatch<float>(
+                   state.residual, image, state.warp, InputsOf(level, first),
+                   PixelsOf(level, first), [&](size_t k, const auto& r) {
+                     const float s = r.squaredNorm();
+                     const float weight = loss.Weight(s);
+                     for (int d = 0; d < kDim; ++d) {
+                       Row row = level.rows[(first + k) * kDim + d];
+                       row(6) = r(d);
+                       sum.AddRow(row, weight);
+                     }
+                     sum.AddCost(0.5 * loss.Rho(s));
+                   });
+             }))
+      total += batch;
+    return total;
+  }
+
+  /// Contributions of whole patches at the end.
+  struct Scatter {
+    BatchEquations equations;
+    Eigen::Matrix<double, kParameters, kParameters> scatter =
+        Eigen::Matrix<double, kParameters, kParameters>::Zero();
+    int in_view = 0, inliers = 0;
+  };
+
+  void AddToScatter(const ReferenceOf& reference, const Pyramid& current, const State& state,
+                    const RobustLoss<float>& loss, size_t first, Scatter& sum) const {
+    const Level& level = reference.levels[0];
+    BatchEquations patch;
+    const bool in_view = LinearizePatch<float>(
+        state.residual, ImageOf(current, 0), state.warp, InputsOf(level, first),
+        PixelsOf(level, first), [&](size_t, const auto& r, const auto& J) {
+          const float s = r.squaredNorm();
+          patch.Add(r, J, loss.Weight(s));
+          patch.AddCost(0.5 * loss.Rho(s));
+        });
+    if (!in_view) return;
+    sum.equations += patch;
+    sum.scatter += patch.b() * patch.b().transpose();
+    ++sum.in_view;
+    if (Correlation(reference, current, state.warp, first) >= options_.inlier_correlation)
+      ++sum.inliers;
+  }
+
+  float Correlation(const ReferenceOf& reference, const Pyramid& current, const Warp& warp,
+                    size_t first) const {
+    GradientCorrelation correlation;
+    for (size_t k = first; k < first + offsets_.size(); ++k) {
+      Warp::Point point;
+      warp.At(reference.levels[0].inputs[k], point);
+      const auto at = current.samples[0].Sample(point.pixel).value;
+      const Vector2<float> g(at[kGradientX], at[kGradientY]);
+      correlation.Add(point.A().transpose() * g, reference.gradients[k]);
+    }
+    return correlation.Value();
+  }
+
+  void Judge(const ReferenceOf& reference, const Pyramid& current, const State& state,
+             const RobustLoss<float>& loss, AlignmentResult& result) const {
+    Scatter total;
+    Equations equations;
+    for (const Scatter& batch :
+         OverPatches<Scatter>(reference.levels[0], [&](size_t first, Scatter& sum) {
+           AddToScatter(reference, current, state, loss, first, sum);
+         })) {
+      equations += batch.equations;
+      total.scatter += batch.scatter;
+      total.in_view += batch.in_view;
+      total.inliers += batch.inliers;
+    }
+    result.mean_cost = equations.MeanCost();
+    result.overlap = reference.points ? double(total.in_view) / double(reference.points) : 0;
+    result.inlier_share = total.in_view ? double(total.inliers) / total.in_view : 0;
+    SetCovariance(equations, total, reference.median_depth, result);
+    result.failure = FailureOf(total.in_view, result);
+  }
+
+  void SetCovariance(const Equations& equations, const Scatter& total, double median_depth,
+                     AlignmentResult& result) const {
+    Eigen::Matrix<double, kParameters, 1> unit = Eigen::Matrix<double, kParameters, 1>::Ones();
+    unit.template head<3>().setConstant(median_depth);
+    const Eigen::Matrix<double, kParameters, kParameters> H = equations.H();
+    const auto scaled = (unit.asDiagonal() * H * unit.asDiagonal()).eval();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(
+        scaled.template topLeftCorner<6, 6>(), Eigen::EigenvaluesOnly);
+    const double least = eigen.eigenvalues()(0), most = eigen.eigenvalues()(5);
+    result.condition = least > 0 ? most / least : std::numeric_limits<double>::infinity();
+    if (!(result.condition < 1e15)) return;
+    const auto inverse = H.inverse().eval();
+    result.covariance = (inverse * total.scatter * inverse).template topLeftCorner<6, 6>();
+  }
+
+  AlignmentFailure FailureOf(int in_view, const AlignmentResult& result) const {
+    if (in_view < options_.min_points) return AlignmentFailure::kFewPoints;
+    if (result.overlap < options_.min_overlap) return AlignmentFailure::kLittleOverlap;
+    if (result.inlier_share < options_.min_inlier_share) return AlignmentFailure::kFewInliers;
+    if (!(result.condition < options_.max_condition)) return AlignmentFailure::kIllConditioned;
+    return AlignmentFailure::kNone;
+  }
+
+  Camera camera_;
+  AlignmentOptions options_;
+  Residual residual_;
+  std::span<const Eigen::Vector2f> offsets_;
+};
+
+namespace {
+
+void Require(bool valid, const char* option, double value, const char* range) {
+  if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
+}
+
+}  // namespace
+
+void CheckOptions(const AlignmentOptions& options) {
+  const ResidualInfo& residual = FindResidual(options.residual);
+  if (options.linearization == Linearization::kInverse && !residual.inverse_compositional)
+    throw Error("linearization",
+                fmt::format("'{}' cannot be linearised at the reference", options.residual));
+  Require(options.levels >= 1 && options.levels <= 10, "levels", options.levels, "1 to 10");
+  Require(options.smallest_side_px >= 8, "smallest_side_px", options.smallest_side_px,
+          "at least 8");
+  Require(options.solver.max_iterations >= 1, "max_iterations", options.solver.max_iterations,
+          "positive");
+  Require(options.solver.tolerance >= 0, "tolerance", options.solver.tolerance, "at least 0");
+  Require(options.min_points >= 6, "min_points", options.min_points, "at least 6");
+  Require(options.threads >= 0, "threads", options.threads, "at least 0");
+}
+
+DirectAligner::DirectAligner(const Camera& camera, const AlignmentOptions& options)
+    : camera_(camera), options_(options) {
+  camera.Check();
+  if (camera.distorted()) throw Error("camera", "has distortion; rectify its images first");
+  CheckOptions(options);
+  engine_ = VisitResidual(options.residual, [&](const auto& residual) {
+    using Residual = std::remove_cvref_t<decltype(residual)>;
+    return std::unique_ptr<const Engine>(
+        std::make_unique<EngineOf<Residual>>(camera, options_, residual));
+  });
+}
+
+DirectAligner::~DirectAligner() = default;
+DirectAligner::DirectAligner(DirectAligner&&) noexcept = default;
+DirectAligner& DirectAligner::operator=(DirectAligner&&) noexcept = default;
+
+Pyramid DirectAligner::MakePyramid(const cv::Mat& grey) const {
+  if (grey.cols != camera_.width || grey.rows != camera_.height)
+    throw Error("image", fmt::format("is {}x{} px; the camera has {}x{}", grey.cols, grey.rows,
+                                     camera_.width, camera_.height));
+  Pyramid pyramid{.size = grey.size()};
+  int levels = 1;
+  while (levels < options_.levels &&
+         (std::min(grey.cols, grey.rows) >> levels) >= options_.smallest_side_px)
+    ++levels;
+  for (const cv::Mat1f& level : GreyPyramid(grey, levels)) {
+    pyramid.samples.push_back(MakeSampleChannels(level, options_.image));
+    if (options_.residual == "bit_planes") pyramid.bit_planes.push_back(MakeBitPlanes(level));
+  }
+  return pyramid;
+}
+
+std::shared_ptr<const DirectAligner::Reference> DirectAligner::MakeReference(
+    const Pyramid& pyramid, std::span<const ReferencePoint> points) const {
+  return engine_->MakeReference(pyramid, points);
+}
+
+AlignmentResult DirectAligner::Align(const Reference& reference, const Pyramid& current,
+                                     const SE3& guess) const {
+  return engine_->Align(reference, current, guess);
+}
+
+std::span<const std::pair<const char*, Linearization>> EnumNames(Linearization) {
+  static constexpr std::pair<const char*, Linearization> kNames[] = {
+      {"forward", Linearization::kForward}, {"inverse", Linearization::kInverse}};
+  return kNames;
+}
+
+std::span<const std::pair<const char*, AlignmentFailure>> EnumNames(AlignmentFailure) {
+  static constexpr std::pair<const char*, AlignmentFailure> kNames[] = {
+      {"none", AlignmentFailure::kNone},
+      {"few_points", AlignmentFailure::kFewPoints},
+      {"little_overlap", AlignmentFailure::kLittleOverlap},
+      {"few_inliers", AlignmentFailure::kFewInliers},
+      {"ill_conditioned", AlignmentFailure::kIllConditioned}};
+  return kNames;
+}
+
+}  // namespace sgf::alignment

@@ -1,0 +1,70 @@
+#include <opencv2/imgproc.hpp>
+
+#include <sgf/alignment/level.h>
+
+namespace sgf::alignment {
+
+SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options) {
+  const GradientImage gradient = ComputeGradient(grey, options.gradient);
+  const cv::Mat1f epsilon = metrics::ComputeEpsilon(gradient, options.epsilon);
+  cv::Mat1f intensity;
+  grey.convertTo(intensity, CV_32F);
+  SampleChannels channels(grey.rows, grey.cols);
+  for (int y = 0; y < grey.rows; ++y) {
+    const float* planes[] = {intensity[y], gradient.x[y], gradient.y[y], epsilon[y]};
+    float* out = channels.At(y, 0);
+    for (int x = 0; x < grey.cols; ++x)
+      for (const float* plane : planes) *out++ = plane[x];
+  }
+  return channels;
+}
+
+BitPlanes MakeBitPlanes(const cv::Mat& grey) {
+  RequireGreyImage(grey, "image");
+  constexpr double kBefore = 0.75, kAfter = 1.5;  // px
+  cv::Mat1f smooth;
+  grey.convertTo(smooth, CV_32F);
+  cv::GaussianBlur(smooth, smooth, {}, kBefore, kBefore, cv::BORDER_REPLICATE);
+  cv::Mat1f padded;
+  cv::copyMakeBorder(smooth, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
+  BitPlanes planes(grey.rows, grey.cols);
+  cv::Mat1f plane(grey.size());
+  for (int k = 0; k < BitPlanes::kChannels; ++k) {
+    const int place = k < 4 ? k : k + 1;  // of the nine, without the centre
+    const cv::Mat1f neighbour = padded(cv::Rect({place % 3, place / 3}, grey.size()));
+    for (int y = 0; y < grey.rows; ++y)
+      for (int x = 0; x < grey.cols; ++x) plane(y, x) = neighbour(y, x) > smooth(y, x) ? 1.f : 0.f;
+    cv::GaussianBlur(plane, plane, {}, kAfter, kAfter, cv::BORDER_REPLICATE);
+    for (int y = 0; y < grey.rows; ++y)
+      for (int x = 0; x < grey.cols; ++x) planes.At(y, x)[k] = plane(y, x);
+  }
+  return planes;
+}
+
+std::vector<cv::Mat1f> GreyPyramid(const cv::Mat& grey, int levels) {
+  RequireGreyImage(grey, "image");
+  std::vector<cv::Mat1f> pyramid(1);
+  grey.convertTo(pyramid[0], CV_32F);
+  for (int level = 1; level < levels; ++level) {
+    const cv::Mat1f& fine = pyramid.back();
+    const cv::Size half(fine.cols / 2, fine.rows / 2);
+    cv::Mat1f coarse;
+    cv::resize(fine(cv::Rect({}, half * 2)), coarse, half, 0, 0, cv::INTER_AREA);
+    pyramid.push_back(coarse);
+  }
+  return pyramid;
+}
+
+Camera LevelCamera(const Camera& camera, int level) {
+  const double scale = 1.0 / (1 << level);
+  Camera result = camera;
+  result.width = camera.width >> level;
+  result.height = camera.height >> level;
+  result.fx = camera.fx * scale;
+  result.fy = camera.fy * scale;
+  result.cx = ToLevel(camera.cx, level);
+  result.cy = ToLevel(camera.cy, level);
+  return result;
+}
+
+}  // namespace sgf::alignment

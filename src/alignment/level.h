@@ -1,0 +1,113 @@
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include <sgf/core/camera.h>
+#include <sgf/core/gradient.h>
+#include <sgf/metrics/epsilon.h>
+
+/// Images as alignment samples them: channels interpolated bilinearly, with the exact derivative of
+/// that interpolation.
+namespace sgf::alignment {
+
+/// Channels of an image at one place, and their derivatives by its column and row.
+template <class T, int N>
+struct ChannelsAt {
+  Eigen::Array<T, N, 1> value;
+  Eigen::Array<T, N, 1> d_x, d_y;  ///< per px
+};
+
+/// An image with N channels for each pixel. Pixel (0, 0) is the centre of the upper left pixel.
+template <int N>
+class ChannelImage {
+ public:
+  static constexpr int kChannels = N;
+
+  ChannelImage() = default;
+  ChannelImage(int rows, int cols) : rows_(rows), cols_(cols), data_(size_t(rows) * cols * N) {}
+
+  int rows() const { return rows_; }
+  int cols() const { return cols_; }
+  float* At(int y, int x) { return data_.data() + (size_t(y) * cols_ + x) * N; }
+  const float* At(int y, int x) const { return data_.data() + (size_t(y) * cols_ + x) * N; }
+
+  /// Whether a place can be sampled: at least a pixel away from the border.
+  template <class T>
+  bool Inside(const Eigen::Matrix<T, 2, 1>& p) const {
+    return p.x() >= T(1) && p.y() >= T(1) && p.x() < T(cols_ - 2) && p.y() < T(rows_ - 2);
+  }
+
+  /// Channels at a place that is Inside().
+  template <class T>
+  ChannelsAt<T, N> Sample(const Eigen::Matrix<T, 2, 1>& p) const {
+    using Pixel = Eigen::Map<const Eigen::Array<float, N, 1>>;
+    const int x = static_cast<int>(p.x());
+    const int y = static_cast<int>(p.y());
+    const T fx = p.x() - T(x);
+    const T fy = p.y() - T(y);
+    const float* upper = At(y, x);
+    const float* lower = upper + size_t(cols_) * N;
+    const Eigen::Array<T, N, 1> a = Pixel(upper).template cast<T>();
+    const Eigen::Array<T, N, 1> b = Pixel(upper + N).template cast<T>();
+    const Eigen::Array<T, N, 1> c = Pixel(lower).template cast<T>();
+    const Eigen::Array<T, N, 1> d = Pixel(lower + N).template cast<T>();
+    const Eigen::Array<T, N, 1> top = a + fx * (b - a);
+    const Eigen::Array<T, N, 1> bottom = c + fx * (d - c);
+    return {top + fy * (bottom - top), (b - a) + fy * ((d - c) - (b - a)), bottom - top};
+  }
+
+ private:
+  int rows_ = 0, cols_ = 0;
+  std::vector<float> data_;
+};
+
+/// Channels of a SampleChannels image.
+enum SampleChannel { kIntensity, kGradientX, kGradientY, kEpsilon };
+
+/// Intensity (grey levels), gradient (grey levels/px) and epsilon ((grey levels/px)^2), from which
+/// all pointwise dissimilarities are made.
+using SampleChannels = ChannelImage<4>;
+
+/// Eight smoothed binary images: bit k of the 3 x 3 census (Alismail, Kilgour, Browning, Lucey,
+/// "Direct visual odometry using bit-planes", 2016).
+using BitPlanes = ChannelImage<8>;
+
+/// How the levels of a pyramid are made.
+struct LevelOptions {
+  GradientOperator gradient = GradientOperator::kScharr;
+  metrics::EpsilonOptions epsilon;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("gradient", gradient, "", "derivative operator");
+    visit("epsilon", epsilon, "", "normalisation of gradients, eq. 6");
+  }
+};
+
+/// Samples of a grey image.
+/// @throws Error for an image that cannot be worked on.
+SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options);
+
+/// Bit-planes of a grey image, smoothed before and after binarisation (standard deviations 0.75 and
+/// 1.5 px, the values that Alismail et al. recommend for odometry).
+/// @throws Error for an image that cannot be worked on.
+BitPlanes MakeBitPlanes(const cv::Mat& grey);
+
+/// Grey images of half the size each, as float; the first has full size. Pixels are means of 2 x 2;
+/// the last row or column of an odd size is dropped.
+std::vector<cv::Mat1f> GreyPyramid(const cv::Mat& grey, int levels);
+
+/// Camera whose image is level `level` of GreyPyramid().
+Camera LevelCamera(const Camera& camera, int level);
+
+/// Place (px) in a level of a place in full size, and back.
+inline double ToLevel(double full_px, int level) { return (full_px + 0.5) / (1 << level) - 0.5; }
+inline double FromLevel(double level_px, int level) {
+  return (level_px + 0.5) * (1 << level) - 0.5;
+}
+
+}  // namespace sgf::alignment

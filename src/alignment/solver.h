@@ -1,0 +1,129 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+/// Gauss-Newton and Levenberg-Marquardt, once for all warps.
+namespace sgf::alignment {
+
+enum class SolverMethod { kGaussNewton, kLevenbergMarquardt };
+std::span<const std::pair<const char*, SolverMethod>> EnumNames(SolverMethod);
+
+struct SolverOptions {
+  SolverMethod method = SolverMethod::kLevenbergMarquardt;
+  int max_iterations = 20;
+  double tolerance = 1e-4;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("method", method, "", "gauss_newton or levenberg_marquardt");
+    visit("max_iterations", max_iterations, "", "of a pyramid level");
+    visit("tolerance", tolerance, "",
+          "stop where a step promises to lower the cost by less than this share of it");
+  }
+};
+
+/// Normal equations H delta = -b of a sum of weighted squares, sum(w ||r + J delta||^2) / 2, gathered
+/// as the one matrix sum(w [J r]^T [J r]).
+template <class T, int P>
+class NormalEquations {
+ public:
+  using Parameters = Eigen::Matrix<double, P, 1>;
+
+  template <class Residual, class Jacobian>
+  void Add(const Residual& r, const Jacobian& J, T weight) {
+    for (int k = 0; k < r.rows(); ++k) {
+      Row row = Row::Zero();
+      row.template head<P>() = J.row(k).transpose();
+      row(P) = r(k);
+      AddRow(row, weight);
+    }
+  }
+
+  /// The same for one component, as (J, r, zeros).
+  static constexpr int kRow = (P + 4) / 4 * 4;
+  using Row = Eigen::Matrix<T, kRow, 1>;
+  void AddRow(const Row& row, T weight) { sum_.noalias() += row * (weight * row).transpose(); }
+
+  void AddCost(double cost) {
+    cost_ += cost;
+    ++residuals_;
+  }
+
+  template <class U>
+  void operator+=(const NormalEquations<U, P>& other) {
+    sum_ += other.sum().template cast<T>();
+    cost_ += other.cost();
+    residuals_ += other.residuals();
+  }
+
+  Eigen::Matrix<double, P, P> H() const {
+    return sum_.template topLeftCorner<P, P>().template cast<double>();
+  }
+  Parameters b() const { return sum_.template block<P, 1>(0, P).template cast<double>(); }
+  const Eigen::Matrix<T, kRow, kRow>& sum() const { return sum_; }
+  double cost() const { return cost_; }  ///< sum of rho / 2
+  int residuals() const { return residuals_; }
+
+  /// Cost for each residual: comparable where not the same ones are in view. Infinite without any.
+  double MeanCost() const { return residuals_ > 0 ? cost_ / residuals_ : INFINITY; }
+
+ private:
+  Eigen::Matrix<T, kRow, kRow> sum_ = Eigen::Matrix<T, kRow, kRow>::Zero();
+  double cost_ = 0;
+  int residuals_ = 0;
+};
+
+struct SolverSummary {
+  int iterations = 0;
+  bool converged = false;
+};
+
+/// Minimises from `state`. Linearises once an iteration: a step is judged by the linearisation at
+/// its end, and taken back where the mean cost has risen (Levenberg-Marquardt).
+/// @param linearize state -> NormalEquations<double, P>.
+/// @param update (state, Parameters) -> the state after a step.
+/// @param[out] last normal equations at the final state.
+template <int P, class State, class Linearize, class Update>
+SolverSummary Minimize(State& state, const Linearize& linearize, const Update& update,
+                       const SolverOptions& options, NormalEquations<double, P>& last) {
+  constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-7, kMostDamping = 1e4;
+  const bool damped = options.method == SolverMethod::kLevenbergMarquardt;
+  double damping = damped ? kFirstDamping : 0;
+  SolverSummary summary;
+  last = linearize(state);
+  while (summary.iterations < options.max_iterations && last.residuals() > 0) {
+    Eigen::Matrix<double, P, P> H = last.H();
+    H.diagonal() *= 1 + damping;
+    H.diagonal().array() += 1e-12 * H.diagonal().maxCoeff();  // a direction without any gradient
+    const Eigen::Matrix<double, P, 1> delta = -H.ldlt().solve(last.b());
+    if (!delta.allFinite()) break;
+    const double promised = -0.5 * last.b().dot(delta);
+    ++summary.iterations;
+    if (!(promised > options.tolerance * last.cost())) {
+      summary.converged = promised >= 0;
+      break;
+    }
+    State next = update(state, delta);
+    NormalEquations<double, P> equations = linearize(next);
+    if (damped && !(equations.MeanCost() <= last.MeanCost())) {
+      damping = std::max(damping, kLeastDamping) * 10;
+      if (damping > kMostDamping) {
+        summary.converged = true;  // no step lowers the cost
+        break;
+      }
+      continue;
+    }
+    damping = damped ? std::max(damping / 10, kLeastDamping) : 0;
+    state = std::move(next);
+    last = std::move(equations);
+  }
+  return summary;
+}
+
+}  // namespace sgf::alignment

@@ -1,0 +1,333 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <optional>
+
+#include <fmt/core.h>
+
+#include <sgf/core/error.h>
+#include <sgf/odometry/odometry.h>
+
+namespace sgf::odometry {
+namespace {
+
+class Stopwatch {
+ public:
+  /// Seconds since the start or the last call.
+  double Lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::duration<double> elapsed = now - start_;
+    start_ = now;
+    return elapsed.count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+/// Angular rates since the last frame.
+class GyroBuffer {
+ public:
+  void Add(std::int64_t time_ns, const Eigen::Vector3d& rate) {
+    if (samples_.empty() || time_ns > samples_.back().time_ns) samples_.push_back({time_ns, rate});
+  }
+
+  /// Rotation R_from_to, each rate holding until the next; none where samples do not span the time.
+  /// Drops what lies before `to_ns`.
+  std::optional<Eigen::Quaterniond> Integrate(std::int64_t from_ns, std::int64_t to_ns) {
+    while (samples_.size() > 1 && samples_[1].time_ns <= from_ns) samples_.pop_front();
+    constexpr std::int64_t kMostGap = 20'000'000;
+    if (samples_.empty() || samples_.front().time_ns > from_ns + kMostGap ||
+        samples_.back().time_ns < to_ns - kMostGap)
+      return std::nullopt;
+    Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
+    for (size_t k = 0; k < samples_.size(); ++k) {
+      const std::int64_t begin = k == 0 ? from_ns : std::max(from_ns, samples_[k].time_ns);
+      const std::int64_t end =
+          k + 1 < samples_.size() ? std::min(to_ns, samples_[k + 1].time_ns) : to_ns;
+      if (end > begin) R = (R * ExpSO3(samples_[k].rate * Seconds(end - begin))).normalized();
+    }
+    return R;
+  }
+
+ private:
+  struct Rate {
+    std::int64_t time_ns;
+    Eigen::Vector3d rate;
+  };
+  std::deque<Rate> samples_;
+};
+
+}  // namespace
+
+class Odometry::Impl {
+ public:
+  Impl(const Rig& rig, const OdometryOptions& options)
+      : rig_(rig),
+        options_(options),
+        aligner_(rig.camera, options.alignment),
+        matcher_(options.matcher) {
+    CheckOptions(options.selection);
+    CheckOptions(options.refinement);
+    if (!(rig.baseline_m >= 0))
+      throw Error("baseline_m", fmt::format("is {}; it has to be at least 0", rig.baseline_m));
+    if (!(options.min_depth_m > 0 && options.max_depth_m > options.min_depth_m))
+      throw Error("min_depth_m", fmt::format("is {} with max_depth_m {}; 0 < min < max",
+                                             options.min_depth_m, options.max_depth_m));
+  }
+
+  FrameResult ProcessStereo(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right) {
+    if (rig_.baseline_m <= 0) throw Error("rig", "has no baseline for stereo pairs");
+    CheckFrame(time_ns, left);
+    CheckImage(right);
+    return Process(time_ns, left, [&](const alignment::Pyramid& pyramid, StageTimes& times) {
+      return StereoPoints(pyramid, left, right, times);
+    });
+  }
+
+  FrameResult ProcessDepth(std::int64_t time_ns, const cv::Mat& grey, const cv::Mat1f& depth_m) {
+    CheckFrame(time_ns, grey);
+    if (depth_m.size() != grey.size())
+      throw Error("depth image", fmt::format("is {}x{} px; the camera has {}x{}", depth_m.cols,
+                                             depth_m.rows, grey.cols, grey.rows));
+    return Process(time_ns, grey, [&](const alignment::Pyramid& pyramid, StageTimes& times) {
+      return DepthPoints(pyramid, depth_m, times);
+    });
+  }
+
+  void ProcessGyro(std::int64_t time_ns, const Eigen::Vector3d& gyro) { gyro_.Add(time_ns, gyro); }
+
+  const Keyframe& LastKeyframe() const {
+    if (references_.empty()) throw Error("odometry", "has no key-frame before the first frame");
+    return references_.back().keyframe;
+  }
+
+ private:
+  using Points = std::vector<alignment::ReferencePoint>;
+  using MakePoints = std::function<Points(const alignment::Pyramid&, StageTimes&)>;
+
+  struct Reference {
+    int index = 0;
+    Keyframe keyframe = {};
+    std::shared_ptr<const alignment::DirectAligner::Reference> patches;
+  };
+
+  /// The last frame that was handed over.
+  struct Last {
+    std::int64_t time_ns = 0;
+    SE3 T_world_cam;
+    SE3 motion = {};  ///< of the camera over the last period, T_before_cam
+    double period_s = 0;
+  };
+
+  void CheckImage(const cv::Mat& image) const {
+    if (image.type() != CV_8UC1)
+      throw Error("image", fmt::format("is of type {}; it has to be 8-bit grey",
+                                       cv::typeToString(image.type())));
+    if (image.cols != rig_.camera.width || image.rows != rig_.camera.height)
+      throw Error("image", fmt::format("is {}x{} px; the camera has {}x{}", image.cols, image.rows,
+                                       rig_.camera.width, rig_.camera.height));
+  }
+
+  void CheckFrame(std::int64_t time_ns, const cv::Mat& image) const {
+    CheckImage(image);
+    if (last_ && time_ns <= last_->time_ns)
+      throw Error("frame", fmt::format("time {} ns is not after the last one's, {} ns", time_ns,
+                                       last_->time_ns));
+  }
+
+  FrameResult Process(std::int64_t time_ns, const cv::Mat& grey, const MakePoints& make_points) {
+    FrameResult result{.time_ns = time_ns};
+    Stopwatch total, stage;
+    const alignment::Pyramid pyramid = aligner_.MakePyramid(grey);
+    result.times.pyramid_s = stage.Lap();
+    if (references_.empty()) {
+      result.state = TrackingState::kInitialised;
+    } else {
+      Track(pyramid, Predict(time_ns), result);
+    }
+    result.times.alignment_s = stage.Lap();
+    lost_frames_ = result.state == TrackingState::kLost ? lost_frames_ + 1 : 0;
+    if (lost_frames_ > options_.lost_frames) result.state = TrackingState::kInitialised;
+    if (NeedsKeyframe(result)) AddKeyframe(pyramid, grey, make_points, result);
+    Remember(result);
+    result.times.total_s = total.Lap();
+    return result;
+  }
+
+  /// Motion since the last frame: rotation by gyroscope, else as over the period before.
+  SE3 Predict(std::int64_t time_ns) {
+    const double share =
+        last_->period_s > 0 ? Seconds(time_ns - last_->time_ns) / last_->period_s : 0;
+    SE3 motion{ExpSO3(share * LogSO3(last_->motion.R)), share * last_->motion.p};
+    if (const auto R = gyro_.Integrate(last_->time_ns, time_ns)) motion.R = *R;
+    return last_->T_world_cam * motion;
+  }
+
+  /// Aligns with the last key-frame and, while that fails, from other guesses and with key-frames
+  /// before it.
+  void Track(const alignment::Pyramid& pyramid, const SE3& predicted, FrameResult& result) const {
+    result.T_world_cam = predicted;
+    if (TrackFrom(references_.back(), pyramid, predicted, result) ||
+        TrackFrom(references_.back(), pyramid, last_->T_world_cam, result))
+      return;
+    for (auto reference = references_.rbegin(); reference != references_.rend(); ++reference)
+      if (TrackFrom(*reference, pyramid, reference->keyframe.T_world_cam, result)) return;
+  }
+
+  bool TrackFrom(const Reference& reference, const alignment::Pyramid& pyramid,
+                 const SE3& T_world_cam, FrameResult& result) const {
+    const alignment::AlignmentResult aligned = aligner_.Align(
+        *reference.patches, pyramid, T_world_cam.Inverse() * reference.keyframe.T_world_cam);
+    result.iterations += aligned.iterations;
+    result.keyframe = reference.index;
+    result.overlap = aligned.overlap;
+    result.inlier_share = aligned.inlier_share;
+    result.condition = aligned.condition;
+    result.failure = aligned.failure;
+    if (!aligned.ok()) return false;
+    result.state = TrackingState::kTracked;
+    result.covariance = aligned.covariance;
+    result.T_world_cam = reference.keyframe.T_world_cam * aligned.T_cur_ref.Inverse();
+    return true;
+  }
+
+  bool NeedsKeyframe(const FrameResult& result) const {
+    if (result.state == TrackingState::kInitialised) return true;
+    return result.state == TrackingState::kTracked &&
+           (result.overlap < options_.keyframe_overlap ||
+            result.inlier_share < options_.keyframe_inliers ||
+            result.keyframe != references_.back().index);
+  }
+
+  void AddKeyframe(const alignment::Pyramid& pyramid, const cv::Mat& grey,
+                   const MakePoints& make_points, FrameResult& result) {
+    const Points points = make_points(pyramid, result.times);
+    if (static_cast<int>(points.size()) < options_.alignment.min_points) {
+      if (result.state == TrackingState::kInitialised) result.state = TrackingState::kLost;
+      return;
+    }
+    Stopwatch stage;
+    Reference reference{.index = keyframes_++, .patches = aligner_.MakeReference(pyramid, points)};
+    reference.keyframe.time_ns = result.time_ns;
+    reference.keyframe.T_world_cam = result.T_world_cam;
+    for (const alignment::ReferencePoint& point : points) {
+      const double depth = 1.0 / point.inverse_depth;
+      reference.keyframe.points.push_back(
+          depth * rig_.camera.Unproject(point.pixel.cast<double>()));
+      reference.keyframe.pixels.push_back(point.pixel);
+      reference.keyframe.grey.push_back(grey.at<uint8_t>(static_cast<int>(point.pixel.y()),
+                                                         static_cast<int>(point.pixel.x())));
+    }
+    references_.push_back(std::move(reference));
+    if (static_cast<int>(references_.size()) > std::max(1, options_.relocation_keyframes))
+      references_.pop_front();
+    result.new_keyframe = true;
+    result.times.selection_s += stage.Lap();
+  }
+
+  void Remember(const FrameResult& result) {
+    Last next{.time_ns = result.time_ns, .T_world_cam = result.T_world_cam};
+    if (last_ && result.state == TrackingState::kTracked) {
+      next.motion = last_->T_world_cam.Inverse() * result.T_world_cam;
+      next.period_s = Seconds(result.time_ns - last_->time_ns);
+    }
+    last_ = next;
+  }
+
+  Points StereoPoints(const alignment::Pyramid& pyramid, const cv::Mat& left, const cv::Mat& right,
+                      StageTimes& times) const {
+    Stopwatch stage;
+    cv::Mat1s disparity;
+    matcher_.Compute(left, right, disparity);
+    times.depth_s = stage.Lap();
+    const double scale = 1.0 / (rig_.camera.fx * rig_.baseline_m);
+    Points points = Select(pyramid, [&](int y, int x) {
+      return disparity(y, x) > 0 ? static_cast<float>(disparity(y, x) / 16.0 * scale) : 0.f;
+    });
+    if (options_.refinement.enabled) {
+      const auto right_channels =
+          alignment::MakeSampleChannels(right, options_.alignment.image);
+      RefineDepths(pyramid.samples[0], right_channels, rig_.camera, rig_.baseline_m,
+                   options_.refinement, points);
+    }
+    times.selection_s = stage.Lap();
+    return points;
+  }
+
+  Points DepthPoints(const alignment::Pyramid& pyramid, const cv::Mat1f& depth_m,
+                     StageTimes& times) const {
+    Stopwatch stage;
+    Points points = Select(pyramid, [&](int y, int x) {
+      const float depth = depth_m(y, x);
+      return std::isfinite(depth) && depth > 0 ? 1 / depth : 0.f;
+    });
+    times.selection_s = stage.Lap();
+    return points;
+  }
+
+  /// @param inverse_depth of a pixel, 1/m; 0 where unknown.
+  template <class InverseDepth>
+  Points Select(const alignment::Pyramid& pyramid, const InverseDepth& inverse_depth) const {
+    const auto nearest = static_cast<float>(1 / options_.min_depth_m);
+    const auto farthest = static_cast<float>(1 / options_.max_depth_m);
+    cv::Mat1b eligible(pyramid.size);
+    for (int y = 0; y < eligible.rows; ++y)
+      for (int x = 0; x < eligible.cols; ++x) {
+        const float value = inverse_depth(y, x);
+        eligible(y, x) = value >= farthest && value <= nearest;
+      }
+    Points points;
+    for (const cv::Point& p :
+         alignment::SelectPoints(pyramid.samples[0], eligible, options_.selection))
+      points.push_back({Eigen::Vector2f(static_cast<float>(p.x), static_cast<float>(p.y)),
+                        inverse_depth(p.y, p.x)});
+    return points;
+  }
+
+  Rig rig_;
+  OdometryOptions options_;
+  alignment::DirectAligner aligner_;
+  stereo::BlockMatcher matcher_;
+  std::deque<Reference> references_;
+  int keyframes_ = 0;
+  int lost_frames_ = 0;
+  std::optional<Last> last_;
+  GyroBuffer gyro_;
+};
+
+Odometry::Odometry(const Rig& rig, const OdometryOptions& options)
+    : impl_(std::make_unique<Impl>(rig, options)) {}
+Odometry::~Odometry() = default;
+Odometry::Odometry(Odometry&&) noexcept = default;
+Odometry& Odometry::operator=(Odometry&&) noexcept = default;
+
+FrameResult Odometry::ProcessStereo(std::int64_t time_ns, const cv::Mat& left,
+                                    const cv::Mat& right) {
+  return impl_->ProcessStereo(time_ns, left, right);
+}
+
+FrameResult Odometry::ProcessDepth(std::int64_t time_ns, const cv::Mat& grey,
+                                   const cv::Mat1f& depth_m) {
+  return impl_->ProcessDepth(time_ns, grey, depth_m);
+}
+
+void Odometry::ProcessGyro(std::int64_t time_ns, const Eigen::Vector3d& gyro) {
+  impl_->ProcessGyro(time_ns, gyro);
+}
+
+const Keyframe& Odometry::LastKeyframe() const { return impl_->LastKeyframe(); }
+
+std::span<const std::pair<const char*, TrackingState>> EnumNames(TrackingState) {
+  static constexpr std::pair<const char*, TrackingState> kNames[] = {
+      {"initialised", TrackingState::kInitialised},
+      {"tracked", TrackingState::kTracked},
+      {"lost", TrackingState::kLost}};
+  return kNames;
+}
+
+}  // namespace sgf::odometry
