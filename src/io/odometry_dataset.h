@@ -90,7 +90,7 @@ OdometrySequence OpenOdometrySequence(const std::filesystem::path& folder,
                                       std::optional<OdometryLayout> layout = std::nullopt,
                                       const RgbdOptions& rgbd = {});
 
-/// Reads a depth image: 16-bit PNG, or channel Z of an EXR file as rendered sequences have it (m).
+/// Reads a depth image: 16-bit PNG, or channel Z of a file *.exr as rendered sequences have it (m).
 /// @param levels_per_m of a PNG, whose level 0 is "unknown".
 /// @return depth along the optical axis in m; NaN where unknown.
 /// @throws Error as ReadImage() or ReadExr(); for another type of image, and for levels_per_m not

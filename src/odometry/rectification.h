@@ -45,8 +45,11 @@ class StereoRectifier {
  private:
   /// Where in a raw image each rectified pixel comes from; empty where nothing is to be done.
   struct RemapTable {
-    cv::Mat position, fraction;  ///< as cv::convertMaps makes them
+    cv::Mat position, fraction;  ///< as cv::convertMaps() makes them
   };
+
+  RemapTable MakeTable(const Camera& raw, const Eigen::Matrix3d& R_raw_rect) const;
+  static cv::Mat Remap(const cv::Mat& raw, const RemapTable& table);
 
   Camera camera_;
   double baseline_m_ = 0;
