@@ -81,7 +81,10 @@ class DirectAligner::EngineOf : public Engine {
 
  public:
   EngineOf(const Camera& camera, const AlignmentOptions& options, const Residual& residual)
-      : camera_(camera), options_(options), residual_(residual), offsets_(Offsets(options.pattern)) {}
+      : camera_(camera),
+        options_(options),
+        residual_(residual),
+        offsets_(Offsets(options.pattern)) {}
 
   std::shared_ptr<const Reference> MakeReference(
       const Pyramid& pyramid, std::span<const ReferencePoint> points) const override {
@@ -147,8 +150,7 @@ class DirectAligner::EngineOf : public Engine {
   Level MakeLevel(const Pyramid& pyramid, int l, std::span<const ReferencePoint> points) const {
     Level level{.camera = LevelCamera(camera_, l)};
     const auto& image = ImageOf(pyramid, l);
-    for (size_t i = 0; i < points.size(); i += size_t(1) << l)
-      AddPatch(image, points[i], l, level);
+    for (size_t i = 0; i < points.size(); i += size_t(1) << l) AddPatch(image, points[i], l, level);
     if (options_.linearization == Linearization::kInverse) LinearizeAtReference(image, level);
     return level;
   }
@@ -201,12 +203,11 @@ class DirectAligner::EngineOf : public Engine {
 
   float Scale(const Level& level, const typename Residual::Channels& image,
               const State& state) const {
-    const auto batches = OverPatches<std::vector<float>>(
-        level, [&](size_t first, std::vector<float>& norms) {
+    const auto batches =
+        OverPatches<std::vector<float>>(level, [&](size_t first, std::vector<float>& norms) {
           EvaluatePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
-                               PixelsOf(level, first), [&](size_t, const auto& r) {
-                                 norms.push_back(r.squaredNorm());
-                               });
+                               PixelsOf(level, first),
+                               [&](size_t, const auto& r) { norms.push_back(r.squaredNorm()); });
         });
     std::vector<float> all;
     for (const auto& norms : batches) all.insert(all.end(), norms.begin(), norms.end());
@@ -233,10 +234,8 @@ class DirectAligner::EngineOf : public Engine {
 
   static State Step(const State& state, const typename Equations::Parameters& delta) {
     State next = state;
-    next.warp = {state.warp.camera,
-                 Perturbation(delta.template head<6>()) * state.warp.T_cur_ref};
-    if constexpr (Residual::kExtraParameters == 2)
-      next.residual.Update(delta.template tail<2>());
+    next.warp = {state.warp.camera, Perturbation(delta.template head<6>()) * state.warp.T_cur_ref};
+    if constexpr (Residual::kExtraParameters == 2) next.residual.Update(delta.template tail<2>());
     return next;
   }
 
@@ -250,16 +249,15 @@ class DirectAligner::EngineOf : public Engine {
   Equations Forward(const Level& level, const typename Residual::Channels& image,
                     const RobustLoss<float>& loss, const State& state) const {
     Equations total;
-    for (const BatchEquations& batch : OverPatches<BatchEquations>(
-             level, [&](size_t first, BatchEquations& sum) {
-               LinearizePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
-                                     PixelsOf(level, first),
-                                     [&](size_t, const auto& r, const auto& J) {
-                                       const float s = r.squaredNorm();
-                                       sum.Add(r, J, loss.Weight(s));
-                                       sum.AddCost(0.5 * loss.Rho(s));
-                                     });
-             }))
+    for (const BatchEquations& batch :
+         OverPatches<BatchEquations>(level, [&](size_t first, BatchEquations&sum) {
+           LinearizePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
+                                 PixelsOf(level, first), [&](size_t, const auto& r, const auto& J) {
+                                   const float s = r.squaredNorm();
+                                   sum.Add(r, J, loss.Weight(s));
+                                   sum.AddCost(0.5 * loss.Rho(s));
+                                 });
+         }))
       total += batch;
     return total;
   }
@@ -267,21 +265,20 @@ class DirectAligner::EngineOf : public Engine {
   Equations Inverse(const Level& level, const typename Residual::Channels& image,
                     const RobustLoss<float>& loss, const State& state) const {
     Equations total;
-    for (const BatchEquations& batch : OverPatches<BatchEquations>(
-             level, [&](size_t first, BatchEquations& sum) {
-               EvaluatePatch<float>(
-                   state.residual, image, state.warp, InputsOf(level, first),
-                   PixelsOf(level, first), [&](size_t k, const auto& r) {
-                     const float s = r.squaredNorm();
-                     const float weight = loss.Weight(s);
-                     for (int d = 0; d < kDim; ++d) {
-                       Row row = level.rows[(first + k) * kDim + d];
-                       row(6) = r(d);
-                       sum.AddRow(row, weight);
-                     }
-                     sum.AddCost(0.5 * loss.Rho(s));
-                   });
-             }))
+    for (const BatchEquations& batch :
+         OverPatches<BatchEquations>(level, [&](size_t first, BatchEquations&sum) {
+           EvaluatePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
+                                PixelsOf(level, first), [&](size_t k, const auto& r) {
+                                  const float s = r.squaredNorm();
+                                  const float weight = loss.Weight(s);
+                                  for (int d = 0; d < kDim; ++d) {
+                                    Row row = level.rows[(first + k) * kDim + d];
+                                    row(6) = r(d);
+                                    sum.AddRow(row, weight);
+                                  }
+                                  sum.AddCost(0.5 * loss.Rho(s));
+                                });
+         }))
       total += batch;
     return total;
   }
@@ -298,13 +295,13 @@ class DirectAligner::EngineOf : public Engine {
                     const RobustLoss<float>& loss, size_t first, Scatter& sum) const {
     const Level& level = reference.levels[0];
     BatchEquations patch;
-    const bool in_view = LinearizePatch<float>(
-        state.residual, ImageOf(current, 0), state.warp, InputsOf(level, first),
-        PixelsOf(level, first), [&](size_t, const auto& r, const auto& J) {
-          const float s = r.squaredNorm();
-          patch.Add(r, J, loss.Weight(s));
-          patch.AddCost(0.5 * loss.Rho(s));
-        });
+    const bool in_view = LinearizePatch<float>(state.residual, ImageOf(current, 0), state.warp,
+                                               InputsOf(level, first), PixelsOf(level, first),
+                                               [&](size_t, const auto& r, const auto& J) {
+                                                 const float s = r.squaredNorm();
+                                                 patch.Add(r, J, loss.Weight(s));
+                                                 patch.AddCost(0.5 * loss.Rho(s));
+                                               });
     if (!in_view) return;
     sum.equations += patch;
     sum.scatter += patch.b() * patch.b().transpose();
@@ -331,7 +328,7 @@ class DirectAligner::EngineOf : public Engine {
     Scatter total;
     Equations equations;
     for (const Scatter& batch :
-         OverPatches<Scatter>(reference.levels[0], [&](size_t first, Scatter& sum) {
+         OverPatches<Scatter>(reference.levels[0], [&](size_t first, Scatter&sum) {
            AddToScatter(reference, current, state, loss, first, sum);
          })) {
       equations += batch.equations;

@@ -38,11 +38,16 @@ std::span<const Eigen::Vector2f> Offsets(Pattern pattern) {
   // and 4.
   static const std::vector<Eigen::Vector2f> kBasalt52 = Grid(7, 2, 8.7f);
   switch (pattern) {
-    case Pattern::kPoint: return kPoint;
-    case Pattern::kDso8: return kDso8;
-    case Pattern::kCross17: return kCross17;
-    case Pattern::kSquare25: return kSquare25;
-    case Pattern::kBasalt52: return kBasalt52;
+    case Pattern::kPoint:
+      return kPoint;
+    case Pattern::kDso8:
+      return kDso8;
+    case Pattern::kCross17:
+      return kCross17;
+    case Pattern::kSquare25:
+      return kSquare25;
+    case Pattern::kBasalt52:
+      return kBasalt52;
   }
   return kDso8;
 }

@@ -13,7 +13,8 @@ void CheckOptions(const SelectionOptions& options) {
   if (options.border_px < 0)
     throw Error("border_px", fmt::format("is {}; it has to be at least 0", options.border_px));
   if (!(options.min_gradient >= 0))
-    throw Error("min_gradient", fmt::format("is {}; it has to be at least 0", options.min_gradient));
+    throw Error("min_gradient",
+                fmt::format("is {}; it has to be at least 0", options.min_gradient));
 }
 
 std::vector<cv::Point> SelectPoints(const SampleChannels& image, const cv::Mat1b& eligible,
@@ -28,8 +29,8 @@ std::vector<cv::Point> SelectPoints(const SampleChannels& image, const cv::Mat1b
       for (int y = top; y < std::min(top + options.cell_px, image.rows() - border); ++y)
         for (int x = left; x < std::min(left + options.cell_px, image.cols() - border); ++x) {
           const float* pixel = image.At(y, x);
-          const float g2 = pixel[kGradientX] * pixel[kGradientX] +
-                           pixel[kGradientY] * pixel[kGradientY];
+          const float g2 =
+              pixel[kGradientX] * pixel[kGradientX] + pixel[kGradientY] * pixel[kGradientY];
           if (g2 > most && eligible(y, x)) {
             most = g2;
             best = {x, y};

@@ -83,8 +83,8 @@ struct PointResidual {
 
   template <class T>
   Eigen::Matrix<T, kDim, 1> Value(const Eigen::Array<T, 4, 1>& channels,
-                                  const Eigen::Matrix<T, 2, 2>& A, const Reference<T>& reference)
-      const {
+                                  const Eigen::Matrix<T, 2, 2>& A,
+                                  const Reference<T>& reference) const {
     return Vectorized(metric(CarrySample<T>(channels, A), reference));
   }
 
@@ -177,8 +177,7 @@ struct BitPlanesResidual {
 
   template <class T, class Point, int P>
   Eigen::Matrix<T, 8, 1> Linearize(const ChannelsAt<T, 8>& at, const Point& point,
-                                   const Reference<T>& reference,
-                                   Eigen::Matrix<T, 8, P>& J) const {
+                                   const Reference<T>& reference, Eigen::Matrix<T, 8, P>& J) const {
     const auto J_pixel = point.Jacobian();
     J = at.d_x.matrix() * J_pixel.row(0) + at.d_y.matrix() * J_pixel.row(1);
     return (at.value - reference).matrix();
@@ -226,8 +225,8 @@ bool EvaluatePatch(const Residual& residual, const typename Residual::Channels& 
     std::array<metrics::Sample<T>, kMaxPatternPixels> samples;
     for (size_t k = 0; k < inputs.size(); ++k)
       samples[k] = Residual::template MakeReference<T>(image.Sample(points[k].pixel));
-    const auto r = metrics::Lssd{}(std::span<const metrics::Sample<T>>(samples.data(), inputs.size()),
-                                   references);
+    const auto r = metrics::Lssd{}(
+        std::span<const metrics::Sample<T>>(samples.data(), inputs.size()), references);
     for (size_t k = 0; k < inputs.size(); ++k) sink(k, Eigen::Matrix<T, 1, 1>(r(k)));
   }
   return true;
@@ -247,8 +246,7 @@ bool LinearizePatch(const Residual& residual, const typename Residual::Channels&
   if constexpr (kPointwise<Residual>) {
     for (size_t k = 0; k < inputs.size(); ++k) {
       Eigen::Matrix<T, Residual::kDim, P> J;
-      const auto r =
-          residual.Linearize(image.Sample(points[k].pixel), points[k], references[k], J);
+      const auto r = residual.Linearize(image.Sample(points[k].pixel), points[k], references[k], J);
       sink(k, r, J);
     }
   } else {

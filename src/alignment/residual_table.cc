@@ -13,8 +13,8 @@ namespace {
 template <class Metric>
 void AddMetric(std::vector<ResidualInfo>& infos) {
   if constexpr (kAlignable<Metric>)
-    infos.push_back({Metric::kInfo.name, Metric::kInfo.formula,
-                     PointResidual<Metric>::kInverseCompositional});
+    infos.push_back(
+        {Metric::kInfo.name, Metric::kInfo.formula, PointResidual<Metric>::kInverseCompositional});
 }
 
 template <class... Metrics>

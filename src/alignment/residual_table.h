@@ -23,7 +23,7 @@ const ResidualInfo& FindResidual(std::string_view name);
 
 template <class Metric>
 inline constexpr bool kAlignable =
-    metrics::PointMetric<Metric> && Metric::kInfo.traits.differentiable;
+    metrics::PointMetric<Metric>&& Metric::kInfo.traits.differentiable;
 
 namespace residual_internal {
 

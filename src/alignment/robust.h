@@ -10,7 +10,8 @@ namespace sgf::alignment {
 enum class RobustKind {
   kNone,      ///< as all others: least squares
   kHuber,     ///< linearly beyond 1.345 scales (95 % efficient under Gaussian noise)
-  kStudentT,  ///< logarithmically: Student's t with 5 degrees of freedom (Kerl, Sturm, Cremers 2013)
+  kStudentT,  ///< logarithmically: Student's t with 5 degrees of freedom (Kerl, Sturm, Cremers
+              ///< 2013)
 };
 std::span<const std::pair<const char*, RobustKind>> EnumNames(RobustKind);
 

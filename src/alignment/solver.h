@@ -28,8 +28,8 @@ struct SolverOptions {
   }
 };
 
-/// Normal equations H delta = -b of a sum of weighted squares, sum(w ||r + J delta||^2) / 2, gathered
-/// as the one matrix sum(w [J r]^T [J r]).
+/// Normal equations H delta = -b of a sum of weighted squares, sum(w ||r + J delta||^2) / 2,
+/// gathered as the one matrix sum(w [J r]^T [J r]).
 template <class T, int P>
 class NormalEquations {
  public:

@@ -4,6 +4,7 @@
 
 #include <sgf/apps/cli.h>
 #include <sgf/apps/stereo_sweep.h>
+#include <sgf/apps/trajectory_scores.h>
 #include <sgf/io/catalogue.h>
 #include <sgf/io/stereo_dataset.h>
 
@@ -47,6 +48,31 @@ void SweepDataset(const DataArguments& data, const StereoSweepRequest& request) 
   throw Error(data.catalogue, fmt::format("has no dataset '{}'", request.dataset));
 }
 
+// The subcommand `trajectory`: its arguments, and what runs it.
+struct TrajectoryCommand {
+  explicit TrajectoryCommand(CLI::App& parent)
+      : app(*parent.add_subcommand("trajectory", "score a trajectory against ground truth")),
+        flags(app, request.options, {}) {
+    app.add_option("estimate", request.estimate, "TUM file: time_s tx ty tz qx qy qz qw")
+        ->required();
+    CLI::Option_group& truth = *app.add_option_group("ground truth");
+    truth.add_option("--sequence", request.sequence,
+                     "folder of a sequence, which also tells the frames and the camera's place");
+    truth.add_option("--truth", request.truth, "TUM file with poses of the estimate's frame");
+    truth.require_option(1);
+    app.add_option("--out", request.output, "file to write: *.json, or else CSV");
+  }
+
+  void Run() {
+    flags.Apply(request.options);
+    ScoreTrajectoryFile(request);
+  }
+
+  TrajectoryScoreRequest request;
+  CLI::App& app;
+  OptionFlags flags;
+};
+
 }  // namespace
 }  // namespace sgf::apps
 
@@ -78,8 +104,11 @@ int main(int argc, char** argv) {
   stereo->add_option("--threads", request.threads, "threads; 0 for all cores")
       ->capture_default_str();
 
+  apps::TrajectoryCommand trajectory(app);
+
   return apps::RunTool(app, argc, argv, [&] {
     if (*datasets) apps::ListDatasets(data);
     if (*stereo) apps::SweepDataset(data, request);
+    if (trajectory.app) trajectory.Run();
   });
 }

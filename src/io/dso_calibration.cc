@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <optional>
 #include <sstream>
 #include <string_view>
 
@@ -14,11 +12,11 @@
 #include <sgf/io/fields.h>
 #include <sgf/io/image.h>
 #include <sgf/io/read_file.h>
+#include <sgf/io/rows.h>
 
 namespace sgf {
 namespace {
 
-constexpr int64_t kSecond = 1'000'000'000;
 constexpr double kWhite = 65535;
 
 std::string AtLine(const std::filesystem::path& path, size_t line) {
@@ -53,20 +51,6 @@ void RequireFrameTime(const FrameTime& frame, const FrameTime* previous, const s
   if (!(frame.exposure_ms > 0 && std::isfinite(frame.exposure_ms)))
     throw Error(where,
                 fmt::format("exposure time is {} ms; it has to be positive", frame.exposure_ms));
-}
-
-// Nanoseconds of a decimal number of seconds, exactly; a double has too few digits for times since
-// 1970.
-std::optional<int64_t> ParseSeconds(std::string_view text) {
-  const size_t point = std::min(text.find('.'), text.size());
-  const std::string_view whole = text.substr(0, point);
-  std::string decimals(text.substr(std::min(point + 1, text.size())));
-  if (!IsNumber(whole) || decimals.size() > 9) return std::nullopt;
-  decimals.resize(9, '0');
-  const auto seconds = ParseNumber<int64_t>(whole);
-  if (!IsNumber(decimals) || !seconds || *seconds >= std::numeric_limits<int64_t>::max() / kSecond)
-    return std::nullopt;
-  return *seconds * kSecond + *ParseNumber<int64_t>(decimals);
 }
 
 FrameTime ParseFrameTime(std::string_view line, const std::string& where) {
@@ -147,8 +131,7 @@ void WriteFrameTimes(const std::filesystem::path& path, const std::vector<FrameT
   for (size_t i = 0; i < times.size(); ++i) {
     const FrameTime& frame = times[i];
     RequireFrameTime(frame, i > 0 ? &times[i - 1] : nullptr, AtLine(path, i + 1));
-    text += fmt::format("{} {}.{:09} {}\n", frame.id, frame.time_ns / kSecond,
-                        frame.time_ns % kSecond, frame.exposure_ms);
+    text += fmt::format("{} {} {}\n", frame.id, FormatSeconds(frame.time_ns), frame.exposure_ms);
   }
   WriteTextFile(path, text);
 }

@@ -1,9 +1,7 @@
 #include <array>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -15,8 +13,9 @@
 #include <sgf/core/error.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/euroc.h>
-#include <sgf/io/fields.h>
 #include <sgf/io/read_file.h>
+#include <sgf/io/rows.h>
+#include <sgf/io/trajectory.h>
 
 namespace sgf {
 namespace {
@@ -38,119 +37,65 @@ constexpr const char* kTruthHeader =
 
 std::string CameraFolder(int camera) { return fmt::format("cam{}", camera); }
 
-// ---- Rows of text files
-
-using Fields = std::vector<std::string_view>;
-using RowReader = std::function<void(const Fields& fields, const std::string& where)>;
-
-// Calls `read` for every line that is neither empty nor a comment.
-void ForEachRow(const fs::path& path, char separator, size_t columns, const RowReader& read) {
-  const std::string text = ReadFile(path);
-  std::string_view rest = text;
-  int rows = 0;
-  for (int number = 1; !rest.empty(); ++number) {
-    const std::string_view line = StripBlanks(rest.substr(0, rest.find('\n')));
-    rest.remove_prefix(std::min(rest.find('\n'), rest.size() - 1) + 1);
-    if (line.empty() || line.front() == '#') continue;
-    const std::string where = fmt::format("{}:{}", path.string(), number);
-    const Fields fields = SplitFields(line, separator);
-    if (fields.size() != columns)
-      throw Error(where, fmt::format("has {} columns, expected {}", fields.size(), columns));
-    read(fields, where);
-    ++rows;
-  }
-  if (rows == 0) throw Error(path.string(), "has no rows");
-}
-
+// A list that has to have rows.
 template <class T>
-T Number(std::string_view text, const std::string& where) {
-  const auto number = ParseNumber<T>(text);
-  if (!number) throw Error(where, fmt::format("{} is no number of its column", Printable(text)));
-  return *number;
-}
-
-Eigen::Vector3d Vector(const Fields& fields, size_t first, const std::string& where) {
-  return {Number<double>(fields[first], where), Number<double>(fields[first + 1], where),
-          Number<double>(fields[first + 2], where)};
-}
-
-// A decimal number of seconds in ns, without the rounding of a double. Digits beyond ns are cut.
-std::int64_t Nanoseconds(std::string_view seconds, const std::string& where) {
-  constexpr size_t kDigits = 9;
-  const size_t point = std::min(seconds.find('.'), seconds.size());
-  std::string fraction(seconds.substr(std::min(point + 1, seconds.size())));
-  fraction.resize(kDigits, '0');
-  const auto whole = Number<std::uint32_t>(seconds.substr(0, point), where);
-  return std::int64_t{whole} * 1'000'000'000 + Number<std::uint32_t>(fraction, where);
-}
-
-template <class T>
-void AppendLater(std::vector<T>& items, T item, const std::string& where) {
-  if (!items.empty() && item.time_ns <= items.back().time_ns)
-    throw Error(where, fmt::format("time {} is not after {}", item.time_ns, items.back().time_ns));
-  items.push_back(std::move(item));
-}
-
-// Files hold quaternions to a few digits. One that is of unit norm to rounding is kept as it is.
-Eigen::Quaterniond UnitQuaternion(const Eigen::Quaterniond& q, const std::string& where) {
-  const double norm = q.norm();
-  if (std::abs(norm - 1) > 1e-3)
-    throw Error(where, fmt::format("quaternion has norm {}, expected 1", norm));
-  return std::abs(norm - 1) < 1e-14 ? q : q.normalized();
+std::vector<T> NotEmpty(std::vector<T> items, const fs::path& path) {
+  if (items.empty()) throw Error(path.string(), "has no rows");
+  return items;
 }
 
 // ---- Reading the lists
 
-std::vector<EurocImage> ReadImageList(const fs::path& folder) {
+std::vector<EurocImage> ReadImageList(const fs::path& folder, EurocFiles files) {
+  const fs::path path = folder / "data.csv";
   std::vector<EurocImage> images;
-  ForEachRow(folder / "data.csv", ',', 2, [&](const Fields& fields, const std::string& where) {
+  ForEachRow(path, ',', 2, [&](const Fields& fields, const std::string& where) {
     const fs::path name(fields[1]);
     const fs::path file = folder / "data" / name;
     std::error_code ignored;
-    if (name != name.filename() || !fs::is_regular_file(file, ignored))
+    const bool missing = files == EurocFiles::kRequired && !fs::is_regular_file(file, ignored);
+    if (name.empty() || name != name.filename() || missing)
       throw Error(where, fmt::format("no image {} in folder data", Printable(fields[1])));
-    AppendLater(images, {Number<std::int64_t>(fields[0], where), file}, where);
+    AppendLater(images, {NumberField<std::int64_t>(fields[0], where), file}, where);
   });
-  return images;
+  return NotEmpty(std::move(images), path);
 }
 
 std::vector<ImuSample> ReadImu(const fs::path& path) {
   std::vector<ImuSample> samples;
   ForEachRow(path, ',', 7, [&](const Fields& fields, const std::string& where) {
     AppendLater(samples,
-                {Number<std::int64_t>(fields[0], where), Vector(fields, 1, where),
-                 Vector(fields, 4, where)},
+                {NumberField<std::int64_t>(fields[0], where), VectorField(fields, 1, where),
+                 VectorField(fields, 4, where)},
                 where);
   });
-  return samples;
+  return NotEmpty(std::move(samples), path);
 }
 
 std::vector<BodyState> ReadTruthCsv(const fs::path& path) {
   std::vector<BodyState> states;
   ForEachRow(path, ',', 17, [&](const Fields& fields, const std::string& where) {
-    const Eigen::Quaterniond q(Number<double>(fields[4], where), Number<double>(fields[5], where),
-                               Number<double>(fields[6], where), Number<double>(fields[7], where));
+    const Eigen::Quaterniond q(
+        NumberField<double>(fields[4], where), NumberField<double>(fields[5], where),
+        NumberField<double>(fields[6], where), NumberField<double>(fields[7], where));
     AppendLater(states,
-                {Number<std::int64_t>(fields[0], where),
-                 {UnitQuaternion(q, where), Vector(fields, 1, where)},
-                 Vector(fields, 8, where),
-                 Vector(fields, 11, where),
-                 Vector(fields, 14, where)},
+                {NumberField<std::int64_t>(fields[0], where),
+                 {UnitQuaternion(q, where), VectorField(fields, 1, where)},
+                 VectorField(fields, 8, where),
+                 VectorField(fields, 11, where),
+                 VectorField(fields, 14, where)},
                 where);
   });
-  return states;
+  return NotEmpty(std::move(states), path);
 }
 
 std::vector<BodyState> ReadTruthTum(const fs::path& path) {
   std::vector<BodyState> states;
-  ForEachRow(path, ' ', 8, [&](const Fields& fields, const std::string& where) {
-    const Eigen::Quaterniond q(Number<double>(fields[7], where), Number<double>(fields[4], where),
-                               Number<double>(fields[5], where), Number<double>(fields[6], where));
-    BodyState state;
-    state.time_ns = Nanoseconds(fields[0], where);
-    state.T_world_body = {UnitQuaternion(q, where), Vector(fields, 1, where)};
-    AppendLater(states, state, where);
-  });
+  for (const TimedPose& truth : NotEmpty(ReadTrajectory(path), path)) {
+    states.emplace_back();
+    states.back().time_ns = truth.time_ns;
+    states.back().T_world_body = truth.pose;
+  }
   return states;
 }
 
@@ -270,11 +215,11 @@ Camera ReadCamera(const SensorFile& file) {
   return camera;
 }
 
-void ReadCameraFolder(const fs::path& folder, EurocSequence& sequence) {
+void ReadCameraFolder(const fs::path& folder, EurocFiles files, EurocSequence& sequence) {
   const SensorFile file(folder / "sensor.yaml");
   sequence.sensors.cameras.push_back(
       {ReadCamera(file), file.GetPose(), file.GetPositive("rate_hz")});
-  sequence.images.push_back(ReadImageList(folder));
+  sequence.images.push_back(ReadImageList(folder, files));
 }
 
 void ReadImuFolder(const fs::path& folder, EurocSequence& sequence) {
@@ -350,11 +295,11 @@ std::string TruthYaml() {
 
 }  // namespace
 
-EurocSequence ReadEuroc(const fs::path& folder) {
+EurocSequence ReadEuroc(const fs::path& folder, EurocFiles files) {
   const fs::path root = fs::is_directory(Mav0(folder)) ? Mav0(folder) : folder;
   EurocSequence sequence;
   for (int i = 0; fs::is_directory(root / CameraFolder(i)); ++i)
-    ReadCameraFolder(root / CameraFolder(i), sequence);
+    ReadCameraFolder(root / CameraFolder(i), files, sequence);
   if (sequence.images.empty()) throw Error(root.string(), "has no folder cam0");
   if (fs::is_directory(root / "imu0")) ReadImuFolder(root / "imu0", sequence);
   if (fs::is_directory(root / kTruthFolder)) ReadTruthFolder(root / kTruthFolder, sequence);

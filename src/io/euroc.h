@@ -45,14 +45,18 @@ struct EurocSequence {
   bool truth_has_rates = false;  ///< `truth` has velocities and biases, not poses alone
 };
 
+/// Whether the images that a sequence lists have to be there.
+enum class EurocFiles { kRequired, kMayBeMissing };
+
 /// Reads a sequence. Ground truth is state_groundtruth_estimate0/data.csv or, where that is
 /// missing, groundtruth_tum.txt beside it (poses: time in s, position, quaternion x y z w).
 /// @param folder the sequence's folder or the mav0 folder in it.
 /// @throws Error naming file and line: a missing file or key, no camera, a number that is none, a
-///   wrong number of columns, times that do not increase, an image that is not there, a list
-///   without rows, another camera or distortion model than pinhole and radial-tangential, a
+///   wrong number of columns, times that do not increase, an image that is required and not there,
+///   a list without rows, another camera or distortion model than pinhole and radial-tangential, a
 ///   rotation or quaternion that is none, an inertial sensor that is not the body frame.
-EurocSequence ReadEuroc(const std::filesystem::path& folder);
+EurocSequence ReadEuroc(const std::filesystem::path& folder,
+                        EurocFiles files = EurocFiles::kRequired);
 
 /// Makes the folders of a sequence and writes its body.yaml and sensor.yaml files, with ground
 /// truth among the sensors. Numbers read back exactly, here and by other readers.

@@ -217,11 +217,11 @@ class Odometry::Impl {
     reference.keyframe.T_world_cam = result.T_world_cam;
     for (const alignment::ReferencePoint& point : points) {
       const double depth = 1.0 / point.inverse_depth;
-      reference.keyframe.points.push_back(
-          depth * rig_.camera.Unproject(point.pixel.cast<double>()));
+      reference.keyframe.points.push_back(depth *
+                                          rig_.camera.Unproject(point.pixel.cast<double>()));
       reference.keyframe.pixels.push_back(point.pixel);
-      reference.keyframe.grey.push_back(grey.at<uint8_t>(static_cast<int>(point.pixel.y()),
-                                                         static_cast<int>(point.pixel.x())));
+      reference.keyframe.grey.push_back(
+          grey.at<uint8_t>(static_cast<int>(point.pixel.y()), static_cast<int>(point.pixel.x())));
     }
     references_.push_back(std::move(reference));
     if (static_cast<int>(references_.size()) > std::max(1, options_.relocation_keyframes))
@@ -250,8 +250,7 @@ class Odometry::Impl {
       return disparity(y, x) > 0 ? static_cast<float>(disparity(y, x) / 16.0 * scale) : 0.f;
     });
     if (options_.refinement.enabled) {
-      const auto right_channels =
-          alignment::MakeSampleChannels(right, options_.alignment.image);
+      const auto right_channels = alignment::MakeSampleChannels(right, options_.alignment.image);
       RefineDepths(pyramid.samples[0], right_channels, rig_.camera, rig_.baseline_m,
                    options_.refinement, points);
     }

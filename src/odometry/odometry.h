@@ -64,7 +64,7 @@ struct Rig {
 enum class TrackingState {
   kInitialised,  ///< the first frame, or the first after being lost without relocation
   kTracked,
-  kLost,         ///< the pose is a prediction and not to be believed
+  kLost,  ///< the pose is a prediction and not to be believed
 };
 std::span<const std::pair<const char*, TrackingState>> EnumNames(TrackingState);
 
@@ -72,7 +72,7 @@ std::span<const std::pair<const char*, TrackingState>> EnumNames(TrackingState);
 struct StageTimes {
   double pyramid_s = 0;
   double alignment_s = 0;
-  double depth_s = 0;      ///< stereo matching; 0 where no key-frame was made
+  double depth_s = 0;  ///< stereo matching; 0 where no key-frame was made
   double selection_s = 0;
   double total_s = 0;
 };
@@ -85,11 +85,11 @@ struct FrameResult {
   /// Of the motion since the key-frame, in the tangent of T_cam_keyframe (left perturbation,
   /// translation in m before rotation in rad).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  int keyframe = -1;        ///< index of the key-frame it was aligned with, counted from 0
+  int keyframe = -1;          ///< index of the key-frame it was aligned with, counted from 0
   bool new_keyframe = false;  ///< this frame has become one
-  double overlap = 0;       ///< share of the key-frame's points that are in view
-  double inlier_share = 0;  ///< of the residuals in view
-  double condition = 0;     ///< of the normal equations
+  double overlap = 0;         ///< share of the key-frame's points that are in view
+  double inlier_share = 0;    ///< of the residuals in view
+  double condition = 0;       ///< of the normal equations
   alignment::AlignmentFailure failure = alignment::AlignmentFailure::kNone;  ///< of the last try
   int iterations = 0;
   StageTimes times = {};
@@ -104,8 +104,8 @@ struct Keyframe {
   std::vector<float> grey;              ///< of the points, grey levels
 };
 
-/// Visual odometry against the last key-frame. Frames are handed over one at a time, in the order of
-/// their times; the pose is that at frame time and is not changed later. Same input, same bits.
+/// Visual odometry against the last key-frame. Frames are handed over one at a time, in the order
+/// of their times; the pose is that at frame time and is not changed later. Same input, same bits.
 class Odometry {
  public:
   /// @throws Error for a camera with distortion or out of range, or an option out of range.

@@ -83,12 +83,12 @@ class Refiner {
   alignment::NormalEquations<double, 1> Linearize(const Patch<Residual>& patch,
                                                   const Warp& warp) const {
     alignment::NormalEquations<double, 1> sum;
-    alignment::LinearizePatch<float>(
-        Residual{}, right_, warp, patch.Rays(), patch.References(),
-        [&](size_t, const auto& r, const auto& J) {
-          sum.Add(r.template cast<double>(), J.template cast<double>(), 1.0);
-          sum.AddCost(0.5 * r.squaredNorm());
-        });
+    alignment::LinearizePatch<float>(Residual{}, right_, warp, patch.Rays(), patch.References(),
+                                     [&](size_t, const auto& r, const auto& J) {
+                                       sum.Add(r.template cast<double>(), J.template cast<double>(),
+                                               1.0);
+                                       sum.AddCost(0.5 * r.squaredNorm());
+                                     });
     return sum;
   }
 
@@ -98,8 +98,8 @@ class Refiner {
       Warp::Point point;
       if (!warp.At(patch.rays[k], point) || !right_.Inside(point.pixel)) return 0;
       const auto at = right_.Sample(point.pixel).value;
-      correlation.Add(point.A().transpose() * Eigen::Vector2f(at[alignment::kGradientX],
-                                                              at[alignment::kGradientY]),
+      correlation.Add(point.A().transpose() *
+                          Eigen::Vector2f(at[alignment::kGradientX], at[alignment::kGradientY]),
                       patch.gradients[k]);
     }
     return correlation.Value();

@@ -14,7 +14,9 @@ ALLOWED = {
     "io": {"core"},
     "eval": {"core"},
     "synth": {"core", "io", "eval"},
-    "apps": {"core", "metrics", "stereo", "io", "eval", "synth"},
+    "alignment": {"core", "metrics"},
+    "odometry": {"core", "metrics", "stereo", "alignment"},
+    "apps": {"core", "metrics", "stereo", "alignment", "odometry", "io", "eval", "synth"},
 }
 
 

@@ -1,0 +1,120 @@
+#include <algorithm>
+#include <iomanip>
+#include <sstream>
+#include <vector>
+
+#include <fmt/core.h>
+#include <nlohmann/json.hpp>
+
+#include <sgf/apps/trajectory_scores.h>
+#include <sgf/core/options.h>
+#include <sgf/io/atomic_file.h>
+#include <sgf/io/fields.h>
+#include <sgf/io/odometry_dataset.h>
+#include <sgf/io/trajectory.h>
+
+namespace sgf::apps {
+namespace {
+
+// What an estimate is compared with.
+struct Reference {
+  std::vector<TimedPose> truth;
+  SE3 T_body_est;
+  std::vector<std::int64_t> frame_times_ns;
+};
+
+Reference SequenceReference(const std::string& folder, PoseFrame frame) {
+  OdometrySequence sequence = OpenOdometrySequence(folder);
+  if (sequence.truth.empty()) throw Error(folder, "has no ground truth");
+  Reference reference;
+  reference.truth = std::move(sequence.truth);
+  if (frame == PoseFrame::kCamera) reference.T_body_est = sequence.cameras.front().T_body_cam;
+  for (const OdometryFrame& f : sequence.frames) reference.frame_times_ns.push_back(f.time_ns);
+  return reference;
+}
+
+Reference FileReference(const std::string& file) {
+  Reference reference;
+  reference.truth = ReadTrajectory(file);
+  if (reference.truth.empty()) throw Error(file, "has no poses");
+  return reference;
+}
+
+// The list of fields that documents options prints scores as well, "default" being the score.
+using Scores = std::vector<OptionDoc>;
+
+void PrintTable(const Scores& scores) {
+  for (const OptionDoc& score : scores) {
+    const auto number = ParseNumber<double>(score.default_value);
+    fmt::print("{:<31} {:>12} {:<3}  {}\n", score.name,
+               number ? fmt::format("{:.6g}", *number) : score.default_value, score.unit,
+               score.text);
+  }
+}
+
+// The request and the scores as names and values; values are not yet quoted.
+struct Record {
+  std::vector<std::pair<std::string, std::string>> texts;
+  Scores scores;
+};
+
+Record MakeRecord(const TrajectoryScoreRequest& request, Scores scores) {
+  Record record{{{"estimate", request.estimate},
+                 {"truth", request.sequence.empty() ? request.truth : request.sequence}},
+                std::move(scores)};
+  for (const OptionDoc& option : DescribeOptions(request.options))
+    record.texts.emplace_back(option.name, option.default_value);
+  return record;
+}
+
+std::string ToCsv(const Record& record) {
+  std::ostringstream names, values;
+  for (const auto& [name, value] : record.texts) {
+    names << name << ",";
+    values << std::quoted(value, '"', '"') << ",";
+  }
+  const char* separator = "";
+  for (const OptionDoc& score : record.scores) {
+    names << separator << score.name;
+    values << separator << score.default_value;
+    separator = ",";
+  }
+  return names.str() + "\n" + values.str() + "\n";
+}
+
+// Numbers that are none become null, which is all that JSON has for them.
+std::string ToJson(const Record& record) {
+  nlohmann::ordered_json json;
+  for (const auto& [name, value] : record.texts) json[name] = value;
+  for (const OptionDoc& score : record.scores) {
+    const bool finite = ParseNumber<double>(score.default_value).has_value();
+    const bool truth_value = score.default_value == "true" || score.default_value == "false";
+    json[score.name] = finite || truth_value ? nlohmann::ordered_json::parse(score.default_value)
+                                             : nlohmann::ordered_json();
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace
+
+std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame) {
+  static constexpr std::pair<const char*, PoseFrame> kNames[] = {{"camera", PoseFrame::kCamera},
+                                                                 {"body", PoseFrame::kBody}};
+  return kNames;
+}
+
+void ScoreTrajectoryFile(const TrajectoryScoreRequest& request) {
+  const Reference reference = request.sequence.empty()
+                                  ? FileReference(request.truth)
+                                  : SequenceReference(request.sequence, request.options.frame);
+  const std::vector<TimedPose> estimate = ReadTrajectory(request.estimate);
+  const Scores scores =
+      DescribeOptions(ScoreTrajectory(estimate, reference.truth, reference.T_body_est,
+                                      reference.frame_times_ns, request.options.trajectory));
+  PrintTable(scores);
+  if (request.output.empty()) return;
+  const Record record = MakeRecord(request, scores);
+  WriteTextFile(request.output, request.output.ends_with(".json") ? ToJson(record) : ToCsv(record));
+}
+
+}  // namespace sgf::apps

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <string>
+
+#include <sgf/eval/trajectory.h>
+
+namespace sgf::apps {
+
+/// The frame whose poses a trajectory file holds.
+enum class PoseFrame {
+  kCamera,  ///< the left (or only) camera of the sequence, as it is calibrated: before
+            ///< rectification
+  kBody,    ///< the frame of the ground truth
+};
+std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame);
+
+/// How `sgf_eval trajectory` compares.
+struct TrajectoryScoreOptions {
+  TrajectoryOptions trajectory;
+  PoseFrame frame = PoseFrame::kCamera;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    trajectory.VisitFields(visit);
+    visit("frame", frame, "", "frame of the estimate with --sequence: camera or body");
+  }
+};
+
+/// What to score. Ground truth is that of a sequence or stands in a file of its own.
+struct TrajectoryScoreRequest {
+  std::string estimate;  ///< TUM file
+  std::string sequence;  ///< folder as OpenOdometrySequence() takes it, or empty
+  std::string truth;     ///< TUM file with poses of the frame of the estimate, or empty
+  std::string output;    ///< file to write: *.json, or else CSV; empty for none
+  TrajectoryScoreOptions options;
+};
+
+/// Scores a trajectory: a table to stdout, and the file that is asked for.
+/// @throws Error for files that cannot be read or written and a sequence without ground truth.
+void ScoreTrajectoryFile(const TrajectoryScoreRequest& request);
+
+}  // namespace sgf::apps

@@ -1,0 +1,40 @@
+#include <iterator>
+#include <string>
+
+#include <fmt/format.h>
+
+#include <sgf/core/error.h>
+#include <sgf/io/atomic_file.h>
+#include <sgf/io/rows.h>
+#include <sgf/io/trajectory.h>
+
+namespace sgf {
+
+std::vector<TimedPose> ReadTrajectory(const std::filesystem::path& path) {
+  std::vector<TimedPose> poses;
+  ForEachRow(path, ' ', 8, [&](const Fields& fields, const std::string& where) {
+    const auto number = [&](size_t i) { return NumberField<double>(fields[i], where); };
+    const Eigen::Quaterniond q(number(7), number(4), number(5), number(6));
+    AppendLater(
+        poses,
+        {SecondsField(fields[0], where), {UnitQuaternion(q, where), VectorField(fields, 1, where)}},
+        where);
+  });
+  return poses;
+}
+
+void WriteTrajectory(const std::filesystem::path& path, std::span<const TimedPose> poses) {
+  std::string text = "# time_s tx ty tz qx qy qz qw\n";
+  std::int64_t last_ns = -1;
+  for (const auto& [time_ns, pose] : poses) {
+    if (time_ns <= last_ns)
+      throw Error(path.string(),
+                  fmt::format("time {} ns does not come after {} ns", time_ns, last_ns));
+    fmt::format_to(std::back_inserter(text), "{} {} {}\n", FormatSeconds(time_ns),
+                   fmt::join(pose.p, " "), fmt::join(pose.R.coeffs(), " "));
+    last_ns = time_ns;
+  }
+  WriteTextFile(path, text);
+}
+
+}  // namespace sgf
