@@ -7,6 +7,7 @@
 #include <fmt/core.h>
 
 #include <sgf/alignment/direct_alignment.h>
+#include <sgf/alignment/patch_alignment.h>
 #include <sgf/alignment/residual_table.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
@@ -28,17 +29,6 @@ SE3 Perturbation(const Eigen::Matrix<double, 6, 1>& delta) {
   return {ExpSO3(delta.tail<3>()), delta.head<3>()};
 }
 
-/// Scale of residuals with `dim` components from the median of their squared norms.
-float MedianScale(std::vector<float>& squared_norms, int dim) {
-  if (squared_norms.empty()) return 1;
-  const auto middle = squared_norms.begin() + static_cast<ptrdiff_t>(squared_norms.size() / 2);
-  std::nth_element(squared_norms.begin(), middle, squared_norms.end());
-  // Median of chi squared with dim degrees of freedom (Wilson and Hilferty).
-  const double d = dim;
-  const double median = d * std::pow(1 - 2 / (9 * d), 3);
-  return static_cast<float>(std::max(std::sqrt(*middle / median), 1e-6));
-}
-
 }  // namespace
 
 class DirectAligner::Engine {
@@ -47,7 +37,7 @@ class DirectAligner::Engine {
   virtual std::shared_ptr<const Reference> MakeReference(
       const Pyramid& pyramid, std::span<const ReferencePoint> points) const = 0;
   virtual AlignmentResult Align(const Reference& reference, const Pyramid& current,
-                                const SE3& guess) const = 0;
+                                const SE3& guess, int levels) const = 0;
 };
 
 template <class Residual>
@@ -101,13 +91,13 @@ class DirectAligner::EngineOf : public Engine {
     return reference;
   }
 
-  AlignmentResult Align(const Reference& base, const Pyramid& current,
-                        const SE3& guess) const override {
+  AlignmentResult Align(const Reference& base, const Pyramid& current, const SE3& guess,
+                        int levels) const override {
     const auto& reference = static_cast<const ReferenceOf&>(base);
     AlignmentResult result;
     State state{{camera_, guess}, residual_};
     RobustLoss<float> loss{options_.loss};
-    for (int l = static_cast<int>(reference.levels.size()) - 1; l >= 0; --l) {
+    for (int l = std::min(levels, static_cast<int>(reference.levels.size())) - 1; l >= 0; --l) {
       const Level& level = reference.levels[l];
       state.warp = {level.camera, state.warp.T_cur_ref};
       const auto& image = ImageOf(current, l);
@@ -150,7 +140,9 @@ class DirectAligner::EngineOf : public Engine {
   Level MakeLevel(const Pyramid& pyramid, int l, std::span<const ReferencePoint> points) const {
     Level level{.camera = LevelCamera(camera_, l)};
     const auto& image = ImageOf(pyramid, l);
-    for (size_t i = 0; i < points.size(); i += size_t(1) << l) AddPatch(image, points[i], l, level);
+    constexpr size_t kEnough = 150;
+    const size_t step = std::clamp<size_t>(points.size() / kEnough, 1, size_t(1) << l);
+    for (size_t i = 0; i < points.size(); i += step) AddPatch(image, points[i], l, level);
     if (options_.linearization == Linearization::kInverse) LinearizeAtReference(image, level);
     return level;
   }
@@ -211,7 +203,7 @@ class DirectAligner::EngineOf : public Engine {
         });
     std::vector<float> all;
     for (const auto& norms : batches) all.insert(all.end(), norms.begin(), norms.end());
-    return MedianScale(all, kDim);
+    return MedianScale(std::span(all), kDim);
   }
 
   int Descend(const Level& level, const typename Residual::Channels& image,
@@ -239,10 +231,10 @@ class DirectAligner::EngineOf : public Engine {
     return next;
   }
 
+  /// The derivative at the reference is that of a motion before the warp: T <- T (exp(w), v).
   static State InverseStep(const State& state, const typename Equations::Parameters& delta) {
     State next = state;
-    next.warp = {state.warp.camera,
-                 state.warp.T_cur_ref * Perturbation(delta.template head<6>()).Inverse()};
+    next.warp = {state.warp.camera, state.warp.T_cur_ref * Perturbation(delta.template head<6>())};
     return next;
   }
 
@@ -433,8 +425,8 @@ std::shared_ptr<const DirectAligner::Reference> DirectAligner::MakeReference(
 }
 
 AlignmentResult DirectAligner::Align(const Reference& reference, const Pyramid& current,
-                                     const SE3& guess) const {
-  return engine_->Align(reference, current, guess);
+                                     const SE3& guess, std::optional<int> levels) const {
+  return engine_->Align(reference, current, guess, levels.value_or(options_.levels));
 }
 
 std::span<const std::pair<const char*, Linearization>> EnumNames(Linearization) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -31,8 +32,8 @@ struct AlignmentOptions {
   std::string residual = "sgf";
   Linearization linearization = Linearization::kForward;
   Pattern pattern = Pattern::kDso8;
-  int levels = 4;
-  int smallest_side_px = 40;
+  int levels = 6;
+  int smallest_side_px = 20;
   RobustKind loss = RobustKind::kStudentT;
   SolverOptions solver;
   LevelOptions image;
@@ -136,7 +137,9 @@ class DirectAligner {
   /// Finds the motion from the reference's camera to the current one.
   /// @param reference made by an aligner of the same options.
   /// @param guess of T_cur_ref.
-  AlignmentResult Align(const Reference& reference, const Pyramid& current, const SE3& guess) const;
+  /// @param levels to start with, the finest among them, where the guess is good; else all.
+  AlignmentResult Align(const Reference& reference, const Pyramid& current, const SE3& guess,
+                        std::optional<int> levels = std::nullopt) const;
 
  private:
   class Engine;

@@ -207,11 +207,12 @@ template <class Residual>
 inline constexpr bool kPointwise = !std::is_same_v<Residual, LssdResidual>;
 
 /// Calls sink(k, r) with the residuals of a patch's pixels k, vectors of Residual::kDim.
+/// @param image a ChannelImage, or anything with its Inside() and Sample().
 /// @param inputs, references of the patch's pixels, at most kMaxPatternPixels.
 /// @return whether the whole patch is in view; the sink is not called otherwise.
-template <class T, class Residual, class Warp, class Sink>
-bool EvaluatePatch(const Residual& residual, const typename Residual::Channels& image,
-                   const Warp& warp, std::span<const typename Warp::Input> inputs,
+template <class T, class Residual, class Image, class Warp, class Sink>
+bool EvaluatePatch(const Residual& residual, const Image& image, const Warp& warp,
+                   std::span<const typename Warp::Input> inputs,
                    std::span<const typename Residual::template Reference<T>> references,
                    Sink&& sink) {
   std::array<typename Warp::Point, kMaxPatternPixels> points;
@@ -234,9 +235,9 @@ bool EvaluatePatch(const Residual& residual, const typename Residual::Channels& 
 
 /// Calls sink(k, r, J) with the residuals and their derivatives by the warp's (and the residual's
 /// extra) parameters. As EvaluatePatch() otherwise.
-template <class T, class Residual, class Warp, class Sink>
-bool LinearizePatch(const Residual& residual, const typename Residual::Channels& image,
-                    const Warp& warp, std::span<const typename Warp::Input> inputs,
+template <class T, class Residual, class Image, class Warp, class Sink>
+bool LinearizePatch(const Residual& residual, const Image& image, const Warp& warp,
+                    std::span<const typename Warp::Input> inputs,
                     std::span<const typename Residual::template Reference<T>> references,
                     Sink&& sink) {
   constexpr int P = Warp::kParameters + Residual::kExtraParameters;

@@ -85,18 +85,21 @@ struct SolverSummary {
 };
 
 /// Minimises from `state`. Linearises once an iteration: a step is judged by the linearisation at
-/// its end, and taken back where the mean cost has risen (Levenberg-Marquardt).
+/// its end, and taken back where the mean cost has risen or too few residuals stay in view
+/// (Levenberg-Marquardt).
 /// @param linearize state -> NormalEquations<double, P>.
 /// @param update (state, Parameters) -> the state after a step.
 /// @param[out] last normal equations at the final state.
 template <int P, class State, class Linearize, class Update>
 SolverSummary Minimize(State& state, const Linearize& linearize, const Update& update,
                        const SolverOptions& options, NormalEquations<double, P>& last) {
+  constexpr double kLeastInView = 0.7;  // the mean must not fall by looking away
   constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-7, kMostDamping = 1e4;
   const bool damped = options.method == SolverMethod::kLevenbergMarquardt;
   double damping = damped ? kFirstDamping : 0;
   SolverSummary summary;
   last = linearize(state);
+  int most_in_view = last.residuals();
   while (summary.iterations < options.max_iterations && last.residuals() > 0) {
     Eigen::Matrix<double, P, P> H = last.H();
     H.diagonal() *= 1 + damping;
@@ -111,7 +114,8 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
     }
     State next = update(state, delta);
     NormalEquations<double, P> equations = linearize(next);
-    if (damped && !(equations.MeanCost() <= last.MeanCost())) {
+    const bool in_view = equations.residuals() >= kLeastInView * most_in_view;
+    if (damped && !(in_view && equations.MeanCost() <= last.MeanCost())) {
       damping = std::max(damping, kLeastDamping) * 10;
       if (damping > kMostDamping) {
         summary.converged = true;  // no step lowers the cost
@@ -122,6 +126,7 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
     damping = damped ? std::max(damping / 10, kLeastDamping) : 0;
     state = std::move(next);
     last = std::move(equations);
+    most_in_view = std::max(most_in_view, last.residuals());
   }
   return summary;
 }

@@ -33,6 +33,7 @@ Eigen::Matrix<T, 3, 3> Cross(const Vector3<T>& a) {
 /// W(u) = centre + offset + p: parameters (x, y), px.
 template <class T>
 struct TranslationWarp {
+  using Scalar = T;
   static constexpr int kParameters = 2;
   using Parameters = Eigen::Matrix<T, kParameters, 1>;
   using Input = Vector2<T>;  ///< offset of the pixel from the patch's centre, px
@@ -58,6 +59,7 @@ struct TranslationWarp {
 /// W(u) = centre + s R(angle) offset: parameters (x, y) px, angle rad and, with kScaled, log s.
 template <class T, bool kScaled>
 struct PlanarWarp {
+  using Scalar = T;
   static constexpr int kParameters = kScaled ? 4 : 3;
   using Parameters = Eigen::Matrix<T, kParameters, 1>;
   using Input = Vector2<T>;  ///< offset of the pixel from the patch's centre, px
@@ -178,6 +180,7 @@ struct Projector {
 /// T <- (exp(w), v) T, translation v (m) before rotation w (rad).
 template <class T>
 struct Se3Warp {
+  using Scalar = T;
   static constexpr int kParameters = 6;
   using Parameters = Eigen::Matrix<T, kParameters, 1>;
   using Input = PixelAtDepth<T>;
@@ -224,6 +227,7 @@ struct Se3Warp {
 /// along its epipolar line.
 template <class T>
 struct EpipolarWarp {
+  using Scalar = T;
   static constexpr int kParameters = 1;
   using Parameters = Eigen::Matrix<T, kParameters, 1>;
   using Input = Vector2<T>;  ///< ray of the pixel: camera coordinates at depth 1

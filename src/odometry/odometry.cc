@@ -172,17 +172,21 @@ class Odometry::Impl {
   /// before it.
   void Track(const alignment::Pyramid& pyramid, const SE3& predicted, FrameResult& result) const {
     result.T_world_cam = predicted;
-    if (TrackFrom(references_.back(), pyramid, predicted, result) ||
-        TrackFrom(references_.back(), pyramid, last_->T_world_cam, result))
+    const Reference& last = references_.back();
+    const int all = options_.alignment.levels;
+    if (TrackFrom(last, pyramid, predicted, options_.tracking_levels, result) ||
+        TrackFrom(last, pyramid, predicted, all, result) ||
+        TrackFrom(last, pyramid, last_->T_world_cam, all, result))
       return;
     for (auto reference = references_.rbegin(); reference != references_.rend(); ++reference)
-      if (TrackFrom(*reference, pyramid, reference->keyframe.T_world_cam, result)) return;
+      if (TrackFrom(*reference, pyramid, reference->keyframe.T_world_cam, all, result)) return;
   }
 
   bool TrackFrom(const Reference& reference, const alignment::Pyramid& pyramid,
-                 const SE3& T_world_cam, FrameResult& result) const {
-    const alignment::AlignmentResult aligned = aligner_.Align(
-        *reference.patches, pyramid, T_world_cam.Inverse() * reference.keyframe.T_world_cam);
+                 const SE3& T_world_cam, int levels, FrameResult& result) const {
+    const alignment::AlignmentResult aligned =
+        aligner_.Align(*reference.patches, pyramid,
+                       T_world_cam.Inverse() * reference.keyframe.T_world_cam, levels);
     result.iterations += aligned.iterations;
     result.keyframe = reference.index;
     result.overlap = aligned.overlap;

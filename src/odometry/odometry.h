@@ -22,9 +22,16 @@
 /// with depth.
 namespace sgf::odometry {
 
+/// Block matching for odometry: more disparities than its own default, since points may be near.
+inline stereo::BlockMatcherOptions DefaultMatcher() {
+  stereo::BlockMatcherOptions options;
+  options.num_disparities = 128;
+  return options;
+}
+
 /// Parameters of Odometry.
 struct OdometryOptions {
-  stereo::BlockMatcherOptions matcher;
+  stereo::BlockMatcherOptions matcher = DefaultMatcher();
   RefinementOptions refinement;
   alignment::SelectionOptions selection;
   alignment::AlignmentOptions alignment;
@@ -32,6 +39,7 @@ struct OdometryOptions {
   double max_depth_m = 100;
   double keyframe_overlap = 0.7;
   double keyframe_inliers = 0.6;
+  int tracking_levels = 4;
   int relocation_keyframes = 5;
   int lost_frames = 20;
 
@@ -47,6 +55,8 @@ struct OdometryOptions {
           "a new key-frame is made when fewer of its points are in view");
     visit("keyframe_inliers", keyframe_inliers, "",
           "a new key-frame is made when the share of inliers falls below");
+    visit("tracking_levels", tracking_levels, "",
+          "pyramid levels that tracking starts with; where that fails, all of them");
     visit("relocation_keyframes", relocation_keyframes, "",
           "last key-frames that a lost camera is aligned with");
     visit("lost_frames", lost_frames, "frames",

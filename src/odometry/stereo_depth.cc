@@ -1,11 +1,10 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <fmt/core.h>
 
+#include <sgf/alignment/patch_alignment.h>
 #include <sgf/alignment/residual_table.h>
-#include <sgf/alignment/solver.h>
 #include <sgf/core/error.h>
 #include <sgf/odometry/stereo_depth.h>
 
@@ -14,19 +13,6 @@ namespace {
 
 using alignment::SampleChannels;
 using Warp = alignment::EpipolarWarp<float>;
-
-/// The pixels of one patch of the left image.
-template <class Residual>
-struct Patch {
-  using Reference = typename Residual::template Reference<float>;
-  std::array<Warp::Input, alignment::kMaxPatternPixels> rays;
-  std::array<Reference, alignment::kMaxPatternPixels> references;
-  std::array<Eigen::Vector2f, alignment::kMaxPatternPixels> gradients;
-  size_t size = 0;
-
-  std::span<const Warp::Input> Rays() const { return {rays.data(), size}; }
-  std::span<const Reference> References() const { return {references.data(), size}; }
-};
 
 template <class Residual>
 class Refiner {
@@ -44,65 +30,42 @@ class Refiner {
 
   /// @return whether the point is to be kept.
   bool operator()(alignment::ReferencePoint& point) const {
-    Patch<Residual> patch;
-    if (!Fill(point.pixel, patch)) return false;
+    const auto ray = [&](const Eigen::Vector2f& offset) { return RayOf(point.pixel + offset); };
+    Patch patch;
+    if (!alignment::MakePatch(left_, point.pixel, offsets_, ray, patch)) return false;
     Warp warp(camera_, T_right_left_, point.inverse_depth);
-    alignment::NormalEquations<double, 1> last;
     const alignment::SolverOptions solver{.max_iterations = options_.max_iterations};
-    alignment::Minimize<1>(
-        warp, [&](const Warp& w) { return Linearize(patch, w); },
-        [](Warp w, const Eigen::Matrix<double, 1, 1>& delta) {
-          w.Update(delta.cast<float>());
-          return w;
-        },
-        solver, last);
+    AlignPatch(Residual{}, right_, patch, alignment::RobustKind::kNone, solver, warp);
     const double change_px =
         std::abs(warp.inverse_depth - point.inverse_depth) * disparity_per_inverse_depth_;
-    if (last.residuals() == 0 || !(change_px <= options_.max_change_px) ||
-        Correlation(patch, warp) < options_.min_correlation)
-      return false;
     point.inverse_depth = warp.inverse_depth;
-    return point.inverse_depth > 0;
+    return warp.inverse_depth > 0 && change_px <= options_.max_change_px &&
+           Correlation(point.pixel, warp) >= options_.min_correlation;
   }
 
  private:
-  bool Fill(const Eigen::Vector2f& centre, Patch<Residual>& patch) const {
+  using Patch = alignment::Patch<Residual, Warp>;
+
+  Eigen::Vector2f RayOf(const Eigen::Vector2f& pixel) const {
+    return {static_cast<float>((pixel.x() - camera_.cx) / camera_.fx),
+            static_cast<float>((pixel.y() - camera_.cy) / camera_.fy)};
+  }
+
+  float Correlation(const Eigen::Vector2f& centre, const Warp& warp) const {
+    alignment::GradientCorrelation correlation;
     for (const Eigen::Vector2f& offset : offsets_) {
       const Eigen::Vector2f pixel = centre + offset;
-      if (!left_.Inside<float>(pixel)) return false;
-      const auto at = left_.Sample<float>(pixel);
-      patch.rays[patch.size] = {static_cast<float>((pixel.x() - camera_.cx) / camera_.fx),
-                                static_cast<float>((pixel.y() - camera_.cy) / camera_.fy)};
-      patch.references[patch.size] = Residual::template MakeReference<float>(at);
-      patch.gradients[patch.size++] = {at.value[alignment::kGradientX],
-                                       at.value[alignment::kGradientY]};
-    }
-    return true;
-  }
-
-  alignment::NormalEquations<double, 1> Linearize(const Patch<Residual>& patch,
-                                                  const Warp& warp) const {
-    alignment::NormalEquations<double, 1> sum;
-    alignment::LinearizePatch<float>(Residual{}, right_, warp, patch.Rays(), patch.References(),
-                                     [&](size_t, const auto& r, const auto& J) {
-                                       sum.Add(r.template cast<double>(), J.template cast<double>(),
-                                               1.0);
-                                       sum.AddCost(0.5 * r.squaredNorm());
-                                     });
-    return sum;
-  }
-
-  float Correlation(const Patch<Residual>& patch, const Warp& warp) const {
-    alignment::GradientCorrelation correlation;
-    for (size_t k = 0; k < patch.size; ++k) {
       Warp::Point point;
-      if (!warp.At(patch.rays[k], point) || !right_.Inside(point.pixel)) return 0;
-      const auto at = right_.Sample(point.pixel).value;
-      correlation.Add(point.A().transpose() *
-                          Eigen::Vector2f(at[alignment::kGradientX], at[alignment::kGradientY]),
-                      patch.gradients[k]);
+      if (!warp.At(RayOf(pixel), point) || !right_.Inside(point.pixel)) return 0;
+      correlation.Add(point.A().transpose() * GradientAt(right_, point.pixel),
+                      GradientAt(left_, pixel));
     }
     return correlation.Value();
+  }
+
+  static Eigen::Vector2f GradientAt(const SampleChannels& image, const Eigen::Vector2f& pixel) {
+    const auto value = image.Sample(pixel).value;
+    return {value[alignment::kGradientX], value[alignment::kGradientY]};
   }
 
   const SampleChannels& left_;
