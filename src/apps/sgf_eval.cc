@@ -65,6 +65,9 @@ struct TrajectoryCommand {
 
   void Run() {
     flags.Apply(request.options);
+    if (request.sequence.empty() && flags.Given().contains("frame"))
+      throw Error("--frame",
+                  "needs --sequence: poses in --truth are those of the estimate's frame");
     ScoreTrajectoryFile(request);
   }
 
