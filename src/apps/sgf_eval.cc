@@ -60,6 +60,8 @@ struct TrajectoryCommand {
                      "folder of a sequence, which also tells the frames and the camera's place");
     truth.add_option("--truth", request.truth, "TUM file with poses of the estimate's frame");
     truth.require_option(1);
+    app.add_option("--common", request.common,
+                   "TUM files of other estimates: compare only poses at times that all have");
     app.add_option("--out", request.output, "file to write: *.json, or else CSV");
   }
 

@@ -90,6 +90,19 @@ def test_a_sequence_tells_how_many_frames_have_a_pose(kitti, walk, tmp_path):
     assert scores["ate_max_m"] < 1e-9 and scores["frame"] == "camera"
 
 
+def test_estimates_are_compared_over_the_poses_that_all_have(kitti, walk, tmp_path):
+    bad_end = walk.copy()
+    bad_end[45:] += 3
+    estimate = write_tum(tmp_path / "estimate.txt", bad_end)
+    other = write_tum(tmp_path / "other.txt", walk[:45])
+    out = tmp_path / "scores.json"
+    arguments = ["trajectory", estimate, "--sequence", kitti, "--out", out]
+    assert scores_of(run("sgf_eval", *arguments), out)["ate_rmse_m"] > 0.5
+    scores = scores_of(run("sgf_eval", *arguments, "--common", other), out)
+    assert scores["ate_rmse_m"] < 1e-9
+    assert (scores["poses"], scores["coverage_pct"]) == (45, 100)
+
+
 def test_an_estimate_without_poses_has_no_errors_and_no_success(kitti, tmp_path):
     estimate = write_tum(tmp_path / "estimate.txt", [])
     out = tmp_path / "scores.json"

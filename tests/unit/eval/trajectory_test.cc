@@ -262,6 +262,16 @@ TEST(Trajectory, CoversTheFramesThatHaveAPose) {
   EXPECT_LT(unknown.ate_max_m, 1e-9);
 }
 
+TEST(Trajectory, IsCutToTheTimesOfAnother) {
+  const Poses poses = Walk(10);
+  Poses other{poses[1], poses[4], poses[9]};
+  other[1].time_ns -= 900;
+  other[2].time_ns += 2000;
+  const Poses common = KeepCommonTimes(poses, other);
+  EXPECT_EQ(Times(common), (std::vector<std::int64_t>{poses[1].time_ns, poses[4].time_ns}));
+  EXPECT_EQ(common[1].pose.p, poses[4].pose.p);
+}
+
 TEST(Trajectory, OfTwoPosesIsNoTrajectory) {
   const Poses truth = Walk(50);
   for (const int poses : {0, 2}) {

@@ -103,14 +103,14 @@ class KittiOdometry : public ::testing::Test {
   KittiOdometry() {
     for (const char* eye : {"image_0", "image_1"})
       for (const char* name : {"000000.png", "000001.png", "000002.png"})
-        WriteImage(dir_.File(kSequence / eye / name));
+        WriteImage(dir_.File(relative_ / eye / name));
     WriteCalib(kP1);
-    dir_.Write(kSequence / "times.txt", "0.000000e+00\n1.036224e-01\n2.5e-01\n");
+    dir_.Write(relative_ / "times.txt", "0.000000e+00\n1.036224e-01\n2.5e-01\n");
     WritePoses(std::string(kPose) + kPose + "0 0 1 4 0 1 0 5 -1 0 0 6\n");
   }
 
   void WriteCalib(const std::string& second) {
-    dir_.Write(kSequence / "calib.txt",
+    dir_.Write(relative_ / "calib.txt",
                "P0: 700 0 600 0 0 700 180 0 0 0 1 0\n" + second + "Tr: 1 0 0 0 0 1 0 0 0 0 1 0\n");
   }
 
@@ -118,9 +118,9 @@ class KittiOdometry : public ::testing::Test {
 
   static constexpr const char* kP1 = "P1: 700 0 600 -350 0 700 180 0 0 0 1 0\n";
   static constexpr const char* kPose = "1 0 0 1 0 1 0 2 0 0 1 3\n";
-  const fs::path kSequence = "dataset/sequences/07";
+  const fs::path relative_ = "dataset/sequences/07";
   const TempDir dir_;
-  const fs::path folder_ = dir_.path() / kSequence;
+  const fs::path folder_ = dir_.path() / relative_;
 };
 
 TEST_F(KittiOdometry, HasRectifiedPairsAndTruthOfTheLeftCamera) {
@@ -171,7 +171,7 @@ TEST_F(KittiOdometry, ReportsBadFiles) {
   EXPECT_THAT(OpenError(folder_), EndsWith("poses/07.txt:4: has more poses than the 3 times"));
   WritePoses(std::string(kPose) + "2 0 0 1 0 1 0 2 0 0 1 3\n");
   EXPECT_THAT(OpenError(folder_), EndsWith("poses/07.txt:2: is no rigid motion"));
-  dir_.Write(kSequence / "times.txt", "0\n0\n");
+  dir_.Write(relative_ / "times.txt", "0\n0\n");
   EXPECT_THAT(OpenError(folder_), EndsWith("times.txt:2: time 0 is not after 0"));
 }
 
@@ -311,6 +311,13 @@ TEST(OdometryDataset, ReadsALayoutThatIsNamed) {
       EndsWith("times.txt: file does not exist"));
 }
 
+void WriteChannel(const fs::path& path, const char* name, const ExrChannel& channel) {
+  ExrImage image;
+  image.size = channel.values.size();
+  image.channels[name] = channel;
+  WriteExr(path, image);
+}
+
 TEST(ReadDepth, GivesMetresAndNanWhereUnknown) {
   const TempDir dir;
   const auto png = dir.path() / "d.png";
@@ -323,7 +330,7 @@ TEST(ReadDepth, GivesMetresAndNanWhereUnknown) {
   const auto exr = dir.path() / "d.exr";
   constexpr float kInf = std::numeric_limits<float>::infinity();
   const cv::Mat1f z = (cv::Mat1f(1, 4) << 1.5F, kInf, 0, -1);
-  WriteExr(exr, {{4, 1}, {{"Z", {z, ExrStorage::kFloat}}}});
+  WriteChannel(exr, "Z", {z, ExrStorage::kFloat});
   const cv::Mat1f read = ReadDepth(exr, 5000);
   EXPECT_EQ(read(0, 0), 1.5F);
   for (int x = 1; x < 4; ++x) EXPECT_TRUE(std::isnan(read(0, x))) << x;
@@ -339,9 +346,9 @@ TEST(ReadDepth, ReportsWhatIsNoDepth) {
               EndsWith("grey.png: depth has one channel of 16 bit, this image is CV_8UC1"));
   EXPECT_EQ(message("grey.png", 0), "depth_levels_per_m: is 0; it has to be positive");
   EXPECT_THAT(message("none.png", 5000), EndsWith("file does not exist"));
-  WriteExr(dir.path() / "n.exr", {{1, 1}, {{"N", {cv::Mat1f(1, 1, 2.F), ExrStorage::kFloat}}}});
+  WriteChannel(dir.path() / "n.exr", "N", {cv::Mat1f(1, 1, 2.F), ExrStorage::kFloat});
   EXPECT_THAT(message("n.exr", 5000), HasSubstr("n.exr"));
-  WriteExr(dir.path() / "z.exr", {{1, 1}, {{"Z", {cv::Mat1i(1, 1, 2), ExrStorage::kUint}}}});
+  WriteChannel(dir.path() / "z.exr", "Z", {cv::Mat1i(1, 1, 2), ExrStorage::kUint});
   EXPECT_THAT(message("z.exr", 5000), EndsWith("z.exr: depth is stored as integers"));
 }
 
