@@ -22,7 +22,7 @@ struct Rig {
   StereoRectifier Rectifier() const { return {left, right, T_left_right}; }
 };
 
-// EuRoC's own calibration: distorted, with principal points 19 px apart in x and 7 px in y.
+// EuRoC's own calibration: distorted, with principal points 13 px apart in x and 7 px in y.
 Rig EurocRig() {
   const auto cameras = synth::RigCameras(synth::RigModel::kEuroc);
   return {cameras[0].camera, cameras[1].camera,
