@@ -112,8 +112,8 @@ std::string ToJson(const Record& record) {
 }  // namespace
 
 std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame) {
-  static constexpr std::pair<const char*, PoseFrame> kNames[] = {{"camera", PoseFrame::kCamera},
-                                                                 {"body", PoseFrame::kBody}};
+  static constexpr std::pair<const char*, PoseFrame> kNames[] = {{"body", PoseFrame::kBody},
+                                                                 {"camera", PoseFrame::kCamera}};
   return kNames;
 }
 

@@ -20,12 +20,12 @@ std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame);
 /// How `sgf_eval trajectory` compares.
 struct TrajectoryScoreOptions {
   TrajectoryOptions trajectory;
-  PoseFrame frame = PoseFrame::kCamera;
+  PoseFrame frame = PoseFrame::kBody;
 
   template <class V>
   void VisitFields(V&& visit) {
     trajectory.VisitFields(visit);
-    visit("frame", frame, "", "frame of the estimate with --sequence: camera or body");
+    visit("frame", frame, "", "what the estimated poses are of, with --sequence: body or camera");
   }
 };
 

@@ -87,7 +87,7 @@ def test_a_sequence_tells_how_many_frames_have_a_pose(kitti, walk, tmp_path):
     result = run("sgf_eval", "trajectory", estimate, "--sequence", kitti, "--out", out)
     scores = scores_of(result, out)
     assert (scores["frames"], scores["poses"], scores["coverage_pct"]) == (POSES, 45, 75)
-    assert scores["ate_max_m"] < 1e-9 and scores["frame"] == "camera"
+    assert scores["ate_max_m"] < 1e-9 and scores["frame"] == "body"
 
 
 def test_estimates_are_compared_over_the_poses_that_all_have(kitti, walk, tmp_path):

@@ -163,7 +163,7 @@ TEST(StereoRectifier, ReportsWhatIsNoPair) {
               HasSubstr("has to be on its right"));
   EXPECT_THAT(message([](Rig& rig) { rig.right.fx = 0; }), HasSubstr("focal lengths are 0, 51"));
   EXPECT_THAT(message([](Rig& rig) {
-                rig.T_left_right.R = ExpSO3({0, 1.2, 0});
+                rig.T_left_right.R = ExpSO3({1.2, 0, 0});
               }),
               HasSubstr("have no common view"));
   EXPECT_THAT(message([](Rig& rig) {
