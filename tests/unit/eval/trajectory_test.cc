@@ -159,7 +159,18 @@ TEST(Trajectory, HasErrorsOfRelativeMotion) {
 }
 
 TEST(Trajectory, TakesTheNearestPoseForTheEndOfAStretch) {
-  Poses truth = StraightOn(40, 1, 0);
+  Poses truth = StraightOn(3, 1, 0);
+  truth[1].time_ns = 490'000'000;
+  truth[2].time_ns = 530'000'000;
+  Poses estimate = truth;
+  estimate[2].pose.p.z() += 1;
+  const TrajectoryScores scores = Score(estimate, truth, TrajectoryAlignment::kNone);
+  EXPECT_EQ(scores.rpe_half_second.stretches, 1);
+  EXPECT_NEAR(scores.rpe_half_second.translation_m, 0, 1e-12);
+}
+
+TEST(Trajectory, HasNoStretchWithoutAPoseNearItsEnd) {
+  const Poses truth = StraightOn(40, 1, 0);
   // 10 Hz with a pose lost: 0.5 s after it began, a stretch ends at 0.5 s or nowhere near.
   Poses estimate;
   for (size_t i = 0; i < truth.size(); i += 2)
