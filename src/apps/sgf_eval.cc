@@ -60,11 +60,16 @@ struct TrajectoryCommand {
                      "folder of a sequence, which also tells the frames and the camera's place");
     truth.add_option("--truth", request.truth, "TUM file with poses of the estimate's frame");
     truth.require_option(1);
+    app.add_option("--common", request.common,
+                   "TUM files of other estimates: compare only poses at times that all have");
     app.add_option("--out", request.output, "file to write: *.json, or else CSV");
   }
 
   void Run() {
     flags.Apply(request.options);
+    if (request.sequence.empty() && flags.Given().contains("frame"))
+      throw Error("--frame",
+                  "needs --sequence: poses in --truth are those of the estimate's frame");
     ScoreTrajectoryFile(request);
   }
 

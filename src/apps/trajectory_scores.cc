@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <iomanip>
 #include <sstream>
-#include <vector>
 
 #include <fmt/core.h>
 #include <nlohmann/json.hpp>
@@ -38,6 +37,21 @@ Reference FileReference(const std::string& file) {
   reference.truth = ReadTrajectory(file);
   if (reference.truth.empty()) throw Error(file, "has no poses");
   return reference;
+}
+
+TrajectoryScores Score(const std::vector<TimedPose>& estimate, const Reference& reference,
+                       const TrajectoryScoreRequest& request) {
+  const auto score = [&](const std::vector<TimedPose>& poses) {
+    return ScoreTrajectory(poses, reference.truth, reference.T_body_est, reference.frame_times_ns,
+                           request.options.trajectory);
+  };
+  if (request.common.empty()) return score(estimate);
+  std::vector<TimedPose> common = estimate;
+  for (const std::string& file : request.common)
+    common = KeepCommonTimes(common, ReadTrajectory(file));
+  TrajectoryScores scores = score(common);
+  scores.coverage_pct = score(estimate).coverage_pct;
+  return scores;
 }
 
 // The list of fields that documents options prints scores as well, "default" being the score.
@@ -98,8 +112,8 @@ std::string ToJson(const Record& record) {
 }  // namespace
 
 std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame) {
-  static constexpr std::pair<const char*, PoseFrame> kNames[] = {{"camera", PoseFrame::kCamera},
-                                                                 {"body", PoseFrame::kBody}};
+  static constexpr std::pair<const char*, PoseFrame> kNames[] = {{"body", PoseFrame::kBody},
+                                                                 {"camera", PoseFrame::kCamera}};
   return kNames;
 }
 
@@ -107,10 +121,8 @@ void ScoreTrajectoryFile(const TrajectoryScoreRequest& request) {
   const Reference reference = request.sequence.empty()
                                   ? FileReference(request.truth)
                                   : SequenceReference(request.sequence, request.options.frame);
-  const std::vector<TimedPose> estimate = ReadTrajectory(request.estimate);
   const Scores scores =
-      DescribeOptions(ScoreTrajectory(estimate, reference.truth, reference.T_body_est,
-                                      reference.frame_times_ns, request.options.trajectory));
+      DescribeOptions(Score(ReadTrajectory(request.estimate), reference, request));
   PrintTable(scores);
   if (request.output.empty()) return;
   const Record record = MakeRecord(request, scores);

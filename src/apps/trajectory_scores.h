@@ -1,6 +1,9 @@
 #pragma once
 
+#include <span>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <sgf/eval/trajectory.h>
 
@@ -17,12 +20,12 @@ std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame);
 /// How `sgf_eval trajectory` compares.
 struct TrajectoryScoreOptions {
   TrajectoryOptions trajectory;
-  PoseFrame frame = PoseFrame::kCamera;
+  PoseFrame frame = PoseFrame::kBody;
 
   template <class V>
   void VisitFields(V&& visit) {
     trajectory.VisitFields(visit);
-    visit("frame", frame, "", "frame of the estimate with --sequence: camera or body");
+    visit("frame", frame, "", "what the estimated poses are of, with --sequence: body or camera");
   }
 };
 
@@ -31,7 +34,10 @@ struct TrajectoryScoreRequest {
   std::string estimate;  ///< TUM file
   std::string sequence;  ///< folder as OpenOdometrySequence() takes it, or empty
   std::string truth;     ///< TUM file with poses of the frame of the estimate, or empty
-  std::string output;    ///< file to write: *.json, or else CSV; empty for none
+  /// TUM files of other estimates: only poses at times that all of them have are compared. Coverage
+  /// stays that of the estimate itself.
+  std::vector<std::string> common;
+  std::string output;  ///< file to write: *.json, or else CSV; empty for none
   TrajectoryScoreOptions options;
 };
 

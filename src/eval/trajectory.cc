@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <limits>
 #include <numbers>
-#include <vector>
+#include <type_traits>
 
 #include <Eigen/Geometry>
 
@@ -226,6 +226,14 @@ std::optional<SE3> InterpolatePose(std::span<const TimedPose> trajectory, std::i
   if (gap_ns > max_gap_s * 1e9) return std::nullopt;
   return Interpolate(earlier.pose, later->pose,
                      static_cast<double>(time_ns - earlier.time_ns) / gap_ns);
+}
+
+std::vector<TimedPose> KeepCommonTimes(std::span<const TimedPose> trajectory,
+                                       std::span<const TimedPose> other) {
+  std::vector<TimedPose> common;
+  for (const TimedPose& pose : trajectory)
+    if (HasPoseAt(other, pose.time_ns)) common.push_back(pose);
+  return common;
 }
 
 TrajectoryScores ScoreTrajectory(std::span<const TimedPose> estimate,

@@ -4,6 +4,7 @@
 #include <optional>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include <sgf/core/se3.h>
 #include <sgf/core/timed_pose.h>
@@ -102,6 +103,11 @@ struct TrajectoryScores {
 ///   `max_gap_s` apart.
 std::optional<SE3> InterpolatePose(std::span<const TimedPose> trajectory, std::int64_t time_ns,
                                    double max_gap_s);
+
+/// The poses of a trajectory at whose times (to 1 us) another one has a pose too. Errors of two
+/// estimates are compared over the same poses only.
+std::vector<TimedPose> KeepCommonTimes(std::span<const TimedPose> trajectory,
+                                       std::span<const TimedPose> other);
 
 /// Scores an estimated trajectory; all errors are those of the body.
 ///

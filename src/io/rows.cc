@@ -17,7 +17,8 @@ bool AreDigits(std::string_view text) {
 // The power of ten after the 'e' of a number; 0 for a number without.
 std::optional<int> Exponent(std::string_view text) {
   if (text.empty()) return 0;
-  text.remove_prefix(text.starts_with("e+") || text.starts_with("E+") ? 2 : 1);
+  text.remove_prefix(1);
+  if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   const auto exponent = ParseNumber<int>(text);
   return exponent && std::abs(*exponent) < 30 ? exponent : std::nullopt;
 }
@@ -26,7 +27,8 @@ std::optional<int> Exponent(std::string_view text) {
 std::optional<std::int64_t> Rounded(std::string digits, int shift) {
   if (shift < 0) return 0;
   digits.resize(static_cast<size_t>(shift) + 1, '0');
-  const auto whole = ParseNumber<std::int64_t>("0" + digits.substr(0, digits.size() - 1));
+  const std::string_view kept = std::string_view(digits).substr(0, digits.size() - 1);
+  const auto whole = ParseNumber<std::int64_t>(kept.empty() ? "0" : kept);
   if (!whole || *whole == std::numeric_limits<std::int64_t>::max()) return std::nullopt;
   return *whole + (digits.back() >= '5');
 }

@@ -27,6 +27,7 @@ void WriteTrajectory(const std::filesystem::path& path, std::span<const TimedPos
   std::string text = "# time_s tx ty tz qx qy qz qw\n";
   std::int64_t last_ns = -1;
   for (const auto& [time_ns, pose] : poses) {
+    if (time_ns < 0) throw Error(path.string(), fmt::format("time {} ns is negative", time_ns));
     if (time_ns <= last_ns)
       throw Error(path.string(),
                   fmt::format("time {} ns does not come after {} ns", time_ns, last_ns));

@@ -65,7 +65,7 @@ Eigen::Vector2d RectifiedRay(const Camera& camera, const Eigen::Matrix3d& R_raw_
 }
 
 // Shrinks `view` until it lies within what a camera sees: within the innermost point of each side
-// of its image.
+// of its image. That one may lie between two pixels of the side, which costs less than 1e-3 px.
 void ShrinkToImage(const Camera& camera, const Eigen::Matrix3d& R_raw_rect, View& view) {
   const double right = camera.width - 1, bottom = camera.height - 1;
   for (int y = 0; y < camera.height; ++y) {

@@ -171,7 +171,6 @@ TEST_F(DsoCalibration, BadFrameTimesAreErrorsWithFileAndLine) {
   EXPECT_EQ(TimesMessage("0 -1 2"), where + "1: time is '-1'");
   EXPECT_EQ(TimesMessage("0 .5 2"), where + "1: time is '.5'");
   EXPECT_EQ(TimesMessage("0 1.2.3 2"), where + "1: time is '1.2.3'");
-  EXPECT_EQ(TimesMessage("0 1.0123456789 2"), where + "1: time is '1.0123456789'");
   EXPECT_EQ(TimesMessage("0 9223372036854775807 2"), where + "1: time is '9223372036854775807'");
   EXPECT_EQ(TimesMessage("0 99999999999999999999 2"), where + "1: time is '99999999999999999999'");
   EXPECT_EQ(TimesMessage("0 1 2ms"), where + "1: exposure time is '2ms'");

@@ -312,10 +312,16 @@ TEST_F(Euroc, ReportsBadImageLists) {
   EXPECT_EQ(ErrorWith("cam1/data.csv", "2000.png", ""), "3: no image '' in folder data");
 }
 
+TEST_F(Euroc, MayBeReadWithoutTheImagesThatItLists) {
+  fs::remove(EurocImagePath(dir_.path(), 1, 2000));
+  EXPECT_THAT(ErrorMessage([&] { ReadEuroc(dir_.path()); }), HasSubstr("no image '2000.png'"));
+  EXPECT_EQ(ReadEuroc(dir_.path(), EurocFiles::kMayBeMissing).images[1].size(), 2U);
+}
+
 TEST_F(Euroc, ReportsBadTimesOfPoses) {
   fs::remove(dir_.path() / "mav0" / kTruthCsv);
   dir_.Write(std::string("mav0/") + kTruthTum, "1.5 1 2 3 0 0 0 1\n2.5 1 2 3 0 0 0 1\n");
-  for (const std::string time : {"x", ".", "1.2x", "1e3", "-1.5", "1.-5", ""})
+  for (const std::string time : {"x", ".", "1.2x", "-1.5", "1.-5", ""})
     EXPECT_THAT(ErrorWith(kTruthTum, "1.5 ", time + " "), StartsWith("1: ")) << time;
   EXPECT_EQ(ErrorWith(kTruthTum, "2.5", "1.5"), "2: time 1500000000 is not after 1500000000");
 }

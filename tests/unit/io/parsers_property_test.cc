@@ -11,6 +11,7 @@
 #include <sgf/io/disparity.h>
 #include <sgf/io/image.h>
 #include <sgf/io/pfm.h>
+#include <sgf/io/trajectory.h>
 
 #include "encoded_images.h"
 #include "support/temp_dir.h"
@@ -104,12 +105,14 @@ const Bytes kPpm = Encode(".ppm", RandomImage(3, 4, CV_8UC3));
 const Bytes kCatalogue =
     "a:\n  title: 'A'\n  layout: kitti2015\n  folders: &x [a/b, \"c\"]\n  scenes: 3\n"
     "b: {title: B, layout: kitti2012, folders: *x}\n";
+const Bytes kTrajectory = "# t x y z\n1.5 0 0 0 0 0 0 1\n2.5e+00 1 2 3 0.5 0.5 0.5 0.5\n";
 
 TEST(ParserProperty, MutationsStartFromValidFiles) {
   EXPECT_TRUE(Parses(kPfm, ReadPfm));
   EXPECT_TRUE(Parses(kCalib, ReadCalibNdisp));
   EXPECT_TRUE(Parses(kCalib, ReadMiddleburyCalib));
   EXPECT_TRUE(Parses(kCatalogue, ReadCatalogue));
+  EXPECT_TRUE(Parses(kTrajectory, ReadTrajectory));
   EXPECT_TRUE(Parses(kPng8, ReadAnyImage));
   EXPECT_TRUE(Parses(kPng16, ReadAnyImage));
   EXPECT_TRUE(Parses(kJpeg, ReadAnyImage));
@@ -136,6 +139,10 @@ RC_GTEST_PROP(ParserProperty, CatalogueFromRandomBytes, ()) {
 
 RC_GTEST_PROP(ParserProperty, CatalogueFromMutatedFiles, ()) {
   ParsesOrFails(Mutated(kCatalogue), ReadCatalogue);
+}
+
+RC_GTEST_PROP(ParserProperty, TrajectoryFromMutatedFiles, ()) {
+  ParsesOrFails(Mutated(kTrajectory), ReadTrajectory);
 }
 
 RC_GTEST_PROP(ParserProperty, ImageFromRandomBytes, ()) {
