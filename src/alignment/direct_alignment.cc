@@ -155,7 +155,10 @@ class DirectAligner::EngineOf : public Engine {
       if (!image.template Inside<float>(centre + offset)) return;
     for (const Eigen::Vector2f& offset : offsets_) {
       const Eigen::Vector2f pixel = centre + offset;
-      level.inputs.push_back({RayOf(level.camera, pixel), point.inverse_depth});
+      const float scale = static_cast<float>(1 << l);  // px of full size in one of the level
+      level.inputs.push_back({RayOf(level.camera, pixel),
+                              point.inverse_depth + scale * point.slope.dot(offset),
+                              scale * point.slope});
       level.pixels.push_back(
           Residual::template MakeReference<float>(image.template Sample<float>(pixel)));
     }

@@ -77,8 +77,9 @@ struct Pyramid {
 
 /// A pixel of a reference image whose depth is known.
 struct ReferencePoint {
-  Eigen::Vector2f pixel;    ///< px
-  float inverse_depth = 0;  ///< 1/m, along the optical axis
+  Eigen::Vector2f pixel;                            ///< px
+  float inverse_depth = 0;                          ///< 1/m, along the optical axis
+  Eigen::Vector2f slope = Eigen::Vector2f::Zero();  ///< of the inverse depth, 1/m per px
 };
 
 /// Why an alignment is not to be believed.

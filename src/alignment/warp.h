@@ -112,17 +112,19 @@ using Se2Warp = PlanarWarp<T, false>;
 template <class T>
 using SimilarityWarp = PlanarWarp<T, true>;
 
-/// A pixel of the reference image and its inverse depth, 1/m. 0 is at infinity.
+/// A pixel of the reference image on a surface. A plane's inverse depth is linear in the pixel, so
+/// that its slope tells how the surface is slanted.
 template <class T>
 struct PixelAtDepth {
-  Vector2<T> ray;  ///< camera coordinates at depth 1
-  T inverse_depth;
+  Vector2<T> ray;    ///< camera coordinates at depth 1
+  T inverse_depth;   ///< 1/m, along the optical axis; 0 is at infinity
+  Vector2<T> slope;  ///< of the inverse depth, 1/m per px
 };
 
 namespace warp_internal {
 
-/// Projection of X = R ray + inverse_depth t and what its derivatives are made of; a patch shares
-/// one inverse depth, so dX/du = R diag(1/fx, 1/fy).
+/// Projection of X = R ray + inverse_depth p and what its derivatives are made of:
+/// dX/du = R diag(1/fx, 1/fy) + p slope^T.
 template <class T>
 struct Projection {
   Vector2<T> pixel;
@@ -166,8 +168,8 @@ struct Projector {
     const T x = out.X.x() * iz, y = out.X.y() * iz;
     out.pixel = {fx * x + cx, fy * y + cy};
     out.d_X << fx * iz, T(0), -fx * x * iz, T(0), fy * iz, -fy * y * iz;
-    out.d_u.col(0) = R.col(0) / fx;
-    out.d_u.col(1) = R.col(1) / fy;
+    out.d_u.col(0) = R.col(0) / fx + p * u.slope.x();
+    out.d_u.col(1) = R.col(1) / fy + p * u.slope.y();
     out.fx = fx;
     out.fy = fy;
     return true;
@@ -187,6 +189,7 @@ struct Se3Warp {
 
   struct Point : warp_internal::Projection<T> {
     T inverse_depth;
+    Vector2<T> slope;
 
     /// d X / d p = [inverse_depth I, -[X]x]
     Eigen::Matrix<T, 3, 6> Motion() const {
@@ -197,11 +200,15 @@ struct Se3Warp {
     }
     Eigen::Matrix<T, 2, 6> Jacobian() const { return this->d_X * Motion(); }
 
-    /// With q = d_X^T v: d_u^T (Hessian(v) dX/dp + [0, [q]x]), since d_u turns with R.
+    /// With q = d_X^T v: d_u^T (Hessian(v) dX/dp + [0, [q]x]) + [slope q^T, 0], since d_u turns
+    /// with the motion and the translation carries the slope.
     Eigen::Matrix<T, 2, 6> Turn(const Vector2<T>& v) const {
+      const Vector3<T> q = this->d_X.transpose() * v;
       Eigen::Matrix<T, 3, 6> d_q = this->Hessian(v) * Motion();
-      d_q.template rightCols<3>() += Cross<T>(this->d_X.transpose() * v);
-      return this->d_u.transpose() * d_q;
+      d_q.template rightCols<3>() += Cross<T>(q);
+      Eigen::Matrix<T, 2, 6> turn = this->d_u.transpose() * d_q;
+      turn.template leftCols<3>() += slope * q.transpose();
+      return turn;
     }
   };
 
@@ -214,6 +221,7 @@ struct Se3Warp {
 
   bool At(const Input& u, Point& point) const {
     point.inverse_depth = u.inverse_depth;
+    point.slope = u.slope;
     return projector(u, point);
   }
   void Update(const Parameters& delta) {
@@ -223,14 +231,14 @@ struct Se3Warp {
   }
 };
 
-/// The same with a known motion: the parameter is the patch's inverse depth (1/m), which moves it
-/// along its epipolar line.
+/// The same with a known motion: the parameter is the inverse depth (1/m) of the patch's centre,
+/// which moves the patch along its epipolar line.
 template <class T>
 struct EpipolarWarp {
   using Scalar = T;
   static constexpr int kParameters = 1;
   using Parameters = Eigen::Matrix<T, kParameters, 1>;
-  using Input = Vector2<T>;  ///< ray of the pixel: camera coordinates at depth 1
+  using Input = PixelAtDepth<T>;  ///< with inverse depths against that of the patch's centre
 
   struct Point : warp_internal::Projection<T> {
     Vector3<T> p;
@@ -246,9 +254,9 @@ struct EpipolarWarp {
   EpipolarWarp(const Camera& camera, const SE3& T_cur_ref, T inverse_depth_in)
       : projector(camera, T_cur_ref), inverse_depth(inverse_depth_in) {}
 
-  bool At(const Input& ray, Point& point) const {
+  bool At(const Input& u, Point& point) const {
     point.p = projector.p;
-    return projector({ray, inverse_depth}, point);
+    return projector({u.ray, inverse_depth + u.inverse_depth, u.slope}, point);
   }
   void Update(const Parameters& delta) { inverse_depth += delta(0); }
 };

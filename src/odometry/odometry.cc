@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include <Eigen/Cholesky>
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
@@ -28,6 +29,33 @@ class Stopwatch {
 };
 
 double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+/// Slope of the inverse depth (1/m per px) around a pixel, by least squares over the neighbours
+/// whose depth is near its own; 0 where there are too few of them.
+template <class InverseDepth>
+Eigen::Vector2f SlopeAt(const cv::Point& centre, const cv::Size& size,
+                        const InverseDepth& inverse_depth) {
+  constexpr int kRadius = 4, kLeastPixels = 20;
+  constexpr float kNear = 0.1f;  // relative
+  const float middle = inverse_depth(centre.y, centre.x);
+  const cv::Rect window =
+      cv::Rect(centre.x - kRadius, centre.y - kRadius, 2 * kRadius + 1, 2 * kRadius + 1) &
+      cv::Rect({}, size);
+  Eigen::Matrix3f H = Eigen::Matrix3f::Zero();
+  Eigen::Vector3f b = Eigen::Vector3f::Zero();
+  for (int y = window.y; y < window.br().y; ++y)
+    for (int x = window.x; x < window.br().x; ++x) {
+      const float difference = inverse_depth(y, x) - middle;
+      if (std::abs(difference) > kNear * middle) continue;
+      const Eigen::Vector3f row(static_cast<float>(x - centre.x), static_cast<float>(y - centre.y),
+                                1);
+      H += row * row.transpose();
+      b += row * difference;
+    }
+  if (H(2, 2) < kLeastPixels) return {0, 0};
+  H.diagonal() += Eigen::Vector3f(1, 1, 0);  // neighbours on one line
+  return H.ldlt().solve(b).head<2>();
+}
 
 /// Angular rates since the last frame.
 class GyroBuffer {
@@ -288,7 +316,7 @@ class Odometry::Impl {
     for (const cv::Point& p :
          alignment::SelectPoints(pyramid.samples[0], eligible, options_.selection))
       points.push_back({Eigen::Vector2f(static_cast<float>(p.x), static_cast<float>(p.y)),
-                        inverse_depth(p.y, p.x)});
+                        inverse_depth(p.y, p.x), SlopeAt(p, pyramid.size, inverse_depth)});
     return points;
   }
 

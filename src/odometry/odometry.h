@@ -37,7 +37,7 @@ struct OdometryOptions {
   alignment::AlignmentOptions alignment;
   double min_depth_m = 0.1;
   double max_depth_m = 100;
-  double keyframe_overlap = 0.7;
+  double keyframe_overlap = 0.9;
   double keyframe_inliers = 0.6;
   int tracking_levels = 4;
   int relocation_keyframes = 5;

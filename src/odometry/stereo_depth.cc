@@ -30,9 +30,9 @@ class Refiner {
 
   /// @return whether the point is to be kept.
   bool operator()(alignment::ReferencePoint& point) const {
-    const auto ray = [&](const Eigen::Vector2f& offset) { return RayOf(point.pixel + offset); };
+    const auto input = [&](const Eigen::Vector2f& offset) { return InputAt(point, offset); };
     Patch patch;
-    if (!alignment::MakePatch(left_, point.pixel, offsets_, ray, patch)) return false;
+    if (!alignment::MakePatch(left_, point.pixel, offsets_, input, patch)) return false;
     Warp warp(camera_, T_right_left_, point.inverse_depth);
     const alignment::SolverOptions solver{.max_iterations = options_.max_iterations};
     AlignPatch(Residual{}, right_, patch, alignment::RobustKind::kNone, solver, warp);
@@ -40,25 +40,27 @@ class Refiner {
         std::abs(warp.inverse_depth - point.inverse_depth) * disparity_per_inverse_depth_;
     point.inverse_depth = warp.inverse_depth;
     return warp.inverse_depth > 0 && change_px <= options_.max_change_px &&
-           Correlation(point.pixel, warp) >= options_.min_correlation;
+           Correlation(point, warp) >= options_.min_correlation;
   }
 
  private:
   using Patch = alignment::Patch<Residual, Warp>;
 
-  Eigen::Vector2f RayOf(const Eigen::Vector2f& pixel) const {
-    return {static_cast<float>((pixel.x() - camera_.cx) / camera_.fx),
-            static_cast<float>((pixel.y() - camera_.cy) / camera_.fy)};
+  Warp::Input InputAt(const alignment::ReferencePoint& point, const Eigen::Vector2f& offset) const {
+    const Eigen::Vector2f pixel = point.pixel + offset;
+    return {{static_cast<float>((pixel.x() - camera_.cx) / camera_.fx),
+             static_cast<float>((pixel.y() - camera_.cy) / camera_.fy)},
+            point.slope.dot(offset),
+            point.slope};
   }
 
-  float Correlation(const Eigen::Vector2f& centre, const Warp& warp) const {
+  float Correlation(const alignment::ReferencePoint& reference, const Warp& warp) const {
     alignment::GradientCorrelation correlation;
     for (const Eigen::Vector2f& offset : offsets_) {
-      const Eigen::Vector2f pixel = centre + offset;
       Warp::Point point;
-      if (!warp.At(RayOf(pixel), point) || !right_.Inside(point.pixel)) return 0;
+      if (!warp.At(InputAt(reference, offset), point) || !right_.Inside(point.pixel)) return 0;
       correlation.Add(point.A().transpose() * GradientAt(right_, point.pixel),
-                      GradientAt(left_, pixel));
+                      GradientAt(left_, reference.pixel + offset));
     }
     return correlation.Value();
   }

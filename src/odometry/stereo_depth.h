@@ -15,7 +15,7 @@ namespace sgf::odometry {
 struct RefinementOptions {
   bool enabled = true;
   std::string residual = "ngv";
-  alignment::Pattern pattern = alignment::Pattern::kSquare25;
+  alignment::Pattern pattern = alignment::Pattern::kDso8;
   int max_iterations = 8;
   double max_change_px = 1;
   double min_correlation = 0.8;
