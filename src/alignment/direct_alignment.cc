@@ -281,6 +281,7 @@ class DirectAligner::EngineOf : public Engine {
   /// Contributions of whole patches at the end.
   struct Scatter {
     BatchEquations equations;
+    BatchEquations curvature;  ///< with the loss's own second derivative instead of its weight
     Eigen::Matrix<double, kParameters, kParameters> scatter =
         Eigen::Matrix<double, kParameters, kParameters>::Zero();
     int in_view = 0, inliers = 0;
@@ -296,6 +297,7 @@ class DirectAligner::EngineOf : public Engine {
                                                  const float s = r.squaredNorm();
                                                  patch.Add(r, J, loss.Weight(s));
                                                  patch.AddCost(0.5 * loss.Rho(s));
+                                                 sum.curvature.Add(r, J, loss.Curvature(s, kDim));
                                                });
     if (!in_view) return;
     sum.equations += patch;
@@ -321,12 +323,13 @@ class DirectAligner::EngineOf : public Engine {
   void Judge(const ReferenceOf& reference, const Pyramid& current, const State& state,
              const RobustLoss<float>& loss, AlignmentResult& result) const {
     Scatter total;
-    Equations equations;
+    Equations equations, curvature;
     for (const Scatter& batch :
          OverPatches<Scatter>(reference.levels[0], [&](size_t first, Scatter&sum) {
            AddToScatter(reference, current, state, loss, first, sum);
          })) {
       equations += batch.equations;
+      curvature += batch.curvature;
       total.scatter += batch.scatter;
       total.in_view += batch.in_view;
       total.inliers += batch.inliers;
@@ -334,15 +337,14 @@ class DirectAligner::EngineOf : public Engine {
     result.mean_cost = equations.MeanCost();
     result.overlap = reference.points ? double(total.in_view) / double(reference.points) : 0;
     result.inlier_share = total.in_view ? double(total.inliers) / total.in_view : 0;
-    SetCovariance(equations, total, reference.median_depth, result);
+    SetCovariance(curvature.H(), total, reference.median_depth, result);
     result.failure = FailureOf(total.in_view, result);
   }
 
-  void SetCovariance(const Equations& equations, const Scatter& total, double median_depth,
-                     AlignmentResult& result) const {
+  void SetCovariance(const Eigen::Matrix<double, kParameters, kParameters>& H, const Scatter& total,
+                     double median_depth, AlignmentResult& result) const {
     Eigen::Matrix<double, kParameters, 1> unit = Eigen::Matrix<double, kParameters, 1>::Ones();
     unit.template head<3>().setConstant(median_depth);
-    const Eigen::Matrix<double, kParameters, kParameters> H = equations.H();
     const auto scaled = (unit.asDiagonal() * H * unit.asDiagonal()).eval();
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(
         scaled.template topLeftCorner<6, 6>(), Eigen::EigenvaluesOnly);

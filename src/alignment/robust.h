@@ -28,6 +28,16 @@ struct RobustLoss {
     return T(1);
   }
 
+  /// Mean eigenvalue of d(Weight(s) r)/dr for a residual r of `dim` components, s = |r|^2: what a
+  /// residual adds to the curvature of the cost, less than its weight in least squares.
+  T Curvature(T s, int dim) const {
+    const T w = Weight(s);
+    if (kind == RobustKind::kHuber && s > HuberLimit()) return w * (T(1) - T(1) / T(dim));
+    if (kind == RobustKind::kStudentT)
+      return w - T(2) * s * w / (T(kFreedom) * scale * scale + s) / T(dim);
+    return w;
+  }
+
   T Rho(T s) const {
     if (kind == RobustKind::kHuber && s > HuberLimit())
       return T(2) * std::sqrt(HuberLimit() * s) - HuberLimit();
