@@ -47,14 +47,7 @@ void OptionFlags::Add(CLI::App& app, const OptionDoc& doc,
   const std::string text = fmt::format("{} (default {}{})", doc.text, doc.default_value, unit);
   app.add_option_function<std::string>(
       flag,
-      [this, name = doc.name](const std::string& value) {
-        YAML::Node map = flags_;
-        size_t begin = 0;
-        for (size_t dot; (dot = name.find('.', begin)) != std::string::npos; begin = dot + 1)
-          map.reset(map[name.substr(begin, dot - begin)]);
-        map[name.substr(begin)] = value;
-      },
-      text);
+      [this, name = doc.name](const std::string& value) { SetOption(flags_, name, value); }, text);
 }
 
 std::set<std::string> OptionFlags::Given() const {

@@ -1,0 +1,137 @@
+/* +------------------------------------------------------------------------+
+   |                 mrpt-sgf-odometry, a module for MRPT                   |
+   |                                                                        |
+   | Copyright (c) 2026, The beyond-photometric contributors                |
+   | Released under the BSD 3-Clause License: see file LICENSE              |
+   +------------------------------------------------------------------------+ */
+#include <mrpt/config/CConfigFile.h>
+#include <mrpt/core/exceptions.h>
+#include <mrpt/core/initializer.h>
+#include <mrpt/obs/CObservationComment.h>
+#include <mrpt/sgf/CSgfOdometrySensor.h>
+
+#include <deque>
+#include <set>
+
+namespace mrpt::sgf
+{
+IMPLEMENTS_GENERIC_SENSOR(CSgfOdometrySensor, mrpt::sgf)
+
+/** Makes the plug-in's sensor known by its name. */
+void registerAllClasses_mrpt_sgf_odometry()
+{
+	CSgfOdometrySensor::doRegister();
+}
+
+MRPT_INITIALIZER(registerAllClasses_mrpt_sgf_odometry_on_load)
+{
+	registerAllClasses_mrpt_sgf_odometry();
+}
+
+namespace
+{
+// Keys of all sensors, which rawlog-grabber and CGenericSensor read, and those
+// of this one. The others are parameters of the odometry.
+const std::set<std::string> kKeys = {
+	"driver",          "process_rate",   "max_queue_len",
+	"grab_decimation", "sensorLabel",    "path",
+	"camera_config",   "camera_section", "emit_source"};
+
+// Observations of a camera that is a sensor itself.
+class CCameraSource : public CObservationSource
+{
+ public:
+	explicit CCameraSource(mrpt::hwdrivers::CGenericSensor::Ptr camera)
+		: m_camera(std::move(camera))
+	{
+		m_camera->initialize();
+	}
+
+	mrpt::obs::CObservation::Ptr next() override
+	{
+		if (m_queue.empty())
+		{
+			m_camera->doProcess();
+			for (const auto& [time, object] : m_camera->getObservations())
+				if (auto obs =
+						std::dynamic_pointer_cast<mrpt::obs::CObservation>(
+							object))
+					m_queue.push_back(obs);
+		}
+		if (m_queue.empty()) return {};
+		auto obs = m_queue.front();
+		m_queue.pop_front();
+		return obs;
+	}
+
+ private:
+	mrpt::hwdrivers::CGenericSensor::Ptr m_camera;
+	std::deque<mrpt::obs::CObservation::Ptr> m_queue;
+};
+
+}  // namespace
+
+void CSgfOdometrySensor::loadConfig_sensorSpecific(
+	const mrpt::config::CConfigFileBase& config, const std::string& section)
+{
+	m_odometry.params.loadFromSharedSection(config, section, kKeys);
+	m_emitSource = config.read_bool(section, "emit_source", m_emitSource);
+	m_path = config.read_string(section, "path", "");
+	const auto cameraFile = config.read_string(section, "camera_config", "");
+	if (m_path.empty() == cameraFile.empty())
+		THROW_EXCEPTION_FMT(
+			"[%s]: has to have either path or camera_config", section.c_str());
+	if (cameraFile.empty()) return;
+	m_camera = createSensorPtr("CCameraSensor");
+	m_camera->loadConfig(
+		mrpt::config::CConfigFile(cameraFile),
+		config.read_string(section, "camera_section", "CAMERA"));
+}
+
+void CSgfOdometrySensor::initialize()
+{
+	if (m_camera)
+		m_source = std::make_unique<CCameraSource>(m_camera);
+	else
+		m_source = openObservations(m_path);
+	m_state = ssWorking;
+}
+
+void CSgfOdometrySensor::doProcess()
+{
+	ASSERTMSG_(m_source, "initialize() has not been called");
+	if (m_ended) return;
+	while (const auto obs = m_source->next())
+	{
+		if (m_emitSource) appendObservation(obs);
+		m_lastTime = std::max(m_lastTime, obs->timestamp);
+		if (const auto result = m_odometry.processObservation(*obs))
+			return emit(*result);
+	}
+	// A camera has no end: there was no image in this period.
+	if (!m_camera) emitReport();
+}
+
+void CSgfOdometrySensor::emit(const TResult& result)
+{
+	if (!result.pose) return;
+	appendObservations(
+		{result.asRobotPose(m_sensorLabel),
+		 result.asOdometry(m_sensorLabel + "_2D")});
+}
+
+void CSgfOdometrySensor::emitReport()
+{
+	// rawlog-grabber never writes the very last object it is given: this one.
+	for (const int step : {1, 2})
+	{
+		auto comment = mrpt::obs::CObservationComment::Create();
+		comment->timestamp = m_lastTime + mrpt::Clock::duration(step);
+		comment->sensorLabel = m_sensorLabel;
+		comment->text = m_odometry.report();
+		appendObservation(comment);
+	}
+	m_ended = true;
+}
+
+}  // namespace mrpt::sgf

@@ -1,0 +1,39 @@
+/* +------------------------------------------------------------------------+
+   |                 mrpt-sgf-odometry, a module for MRPT                   |
+   |                                                                        |
+   | Copyright (c) 2026, The beyond-photometric contributors                |
+   | Released under the BSD 3-Clause License: see file LICENSE              |
+   +------------------------------------------------------------------------+ */
+#include <mrpt/core/exceptions.h>
+#include <mrpt/sgf/DataSourceSgfOdometry.h>
+
+namespace mrpt::sgf
+{
+bool DataSourceSgfOdometry::impl_get_next_observations(
+	mrpt::obs::CActionCollection::Ptr& action,
+	mrpt::obs::CSensoryFrame::Ptr& observations,
+	mrpt::obs::CObservation::Ptr& observation)
+{
+	ASSERTMSG_(source, "DataSourceSgfOdometry::source is not set");
+	observation.reset();
+	auto others = mrpt::obs::CSensoryFrame::Create();
+	while (const auto obs = source->next())
+	{
+		const auto result = odometry.processObservation(*obs);
+		if (!result)
+		{
+			others->insert(obs);
+			continue;
+		}
+		if (!result->increment) continue;
+		auto movement = result->asAction();
+		action = mrpt::obs::CActionCollection::Create();
+		action->insert(movement);
+		observations = result->asSensoryFrame("SGF_ODOMETRY");
+		for (const auto& other : *others) observations->insert(other);
+		return true;
+	}
+	return false;
+}
+
+}  // namespace mrpt::sgf
