@@ -7,6 +7,7 @@
 
 #include <Eigen/Geometry>
 
+#include <sgf/eval/statistics.h>
 #include <sgf/eval/trajectory.h>
 
 namespace sgf {
@@ -94,12 +95,6 @@ double RootMeanSquare(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value * value;
   return std::sqrt(sum / static_cast<double>(values.size()));
-}
-
-double Median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  const size_t n = values.size();
-  return 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
 
 double Largest(const std::vector<double>& values) {
