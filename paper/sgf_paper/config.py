@@ -349,6 +349,49 @@ class SelfMatch:
         }
 
 
+@dataclass(frozen=True)
+class ImageSet:
+    """Images that patches are tracked in: left images of data sets, and views of rendered pairs."""
+
+    title: str
+    datasets: list[str] = field(default_factory=list)  # all their pairs
+    rendered: list[str] = field(default_factory=list)
+
+    def files(self, generated: Path, datasets: dict[str, Dataset]) -> list[Path]:
+        """The images, data sets first. @param generated folder of generated data sets."""
+        left = [sorted(datasets[name].folder.glob("*/im0.png")) for name in self.datasets]
+        return sum(left, []) + [generated / "pairs" / name / "view.png" for name in self.rendered]
+
+
+@dataclass(frozen=True)
+class ConvergenceColumn:
+    residual: str
+    epsilon: dict[str, Any] = field(default_factory=dict)
+    compared: bool = False  # its converged tracks bound the common set
+
+
+@dataclass
+class Convergence:
+    """What `sgf_study convergence` runs and how it is shown."""
+
+    kind: str
+    name: str
+    title: str
+    image_sets: list[ImageSet]
+    study: dict[str, Any]
+    drawn: list[str]
+    table_start: dict[str, float]  # by unit
+    columns: dict[str, ConvergenceColumn]
+    cases: dict[str, dict[str, Any]]
+
+    def images(self, datasets: dict[str, Dataset]) -> ImageSet:
+        """The first set whose data sets were found."""
+        for images in self.image_sets:
+            if set(images.datasets) <= set(datasets):
+                return images
+        raise ConfigError(f"{self.name}: no image set is at hand")
+
+
 @dataclass
 class ShiftProfile:
     """What `sgf_study shift-profile` runs."""
@@ -387,7 +430,8 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, SemiDense, SelfMatch, ShiftProfile
+    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, SemiDense,
+    SelfMatch, ShiftProfile,
 ]
 
 
@@ -504,9 +548,24 @@ def _build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
     return figure
 
 
+def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
+    study = _build(Convergence, node, where)
+    study.image_sets = [_build(ImageSet, images, f"{where}: image_sets") for images in study.image_sets]
+    if study.image_sets[-1].datasets:
+        raise ConfigError(f"{where}: image_sets: the last one must need no data set")
+    study.columns = {
+        name: _build(ConvergenceColumn, column, f"{where}: columns.{name}")
+        for name, column in study.columns.items()
+    }
+    if unknown := set(study.drawn) - set(study.columns):
+        raise ConfigError(f"{where}: drawn: no column {sorted(unknown)}")
+    return study
+
+
 BUILDERS = {
     "benchmark": partial(_build, Benchmark),
     "contact_sheet": partial(_build, ContactSheet),
+    "convergence": _build_convergence,
     "density": partial(_build, Density),
     "disparity_figure": _build_figure,
     "light_change": _build_light_change,

@@ -89,7 +89,9 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
         return any(config.load_experiment(table).present(datasets) for table in stage.tables)
     if stage.kind == "disparity_figure":
         return stage.group(datasets) is not None
-    if stage.kind in ("contact_sheet", "self_match", "semi_dense", "sequences", "shift_profile"):
+    if stage.kind in (
+        "contact_sheet", "convergence", "self_match", "semi_dense", "sequences", "shift_profile",
+    ):  # fmt: skip
         return True  # rendered
     return stage.pair(datasets) is not None
 

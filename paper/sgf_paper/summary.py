@@ -16,6 +16,7 @@ FILES = {
     "light_change": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "benchmark": "tables/{}.md (.csv)",
     "contact_sheet": "figures/{}.png (.pdf)",
+    "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
@@ -28,6 +29,7 @@ MAIN_FILE = {
     "light_change": "tables/{}.csv",
     "benchmark": "tables/{}.csv",
     "contact_sheet": "figures/{}.png",
+    "convergence": "tables/{}.csv",
     "sequences": "tables/{}.csv",
     "semi_dense": "tables/{}.csv",
     "self_match": "tables/{}.csv",
@@ -100,6 +102,18 @@ def _self_match_lines(path: Path) -> list[str]:
     return lines
 
 
+def _convergence_lines(path: Path, start_px: float) -> list[str]:
+    """Per case the compared columns by the share of tracks that converge from one start."""
+    frame = pd.read_csv(path)
+    shown = frame[(frame["unit"] == "px") & (frame["start"] == start_px) & frame["compared"]]
+    lines = []
+    for case, rows in shown.groupby("case", sort=False):
+        order = rows.sort_values("converged_pct", ascending=False, kind="stable")
+        texts = [f"{row.column} {row.converged_pct:.0f}" for row in order.itertuples()]
+        lines.append(f"{case}, converged from {start_px:g} px, %: {', '.join(texts)}")
+    return lines
+
+
 def _light_change_lines(path: Path) -> list[str]:
     """Per data set, region, case and matcher the columns by the rise of their mean error."""
     frame = pd.read_csv(path, dtype={"case": str}).dropna(subset="mean_px_rise")
@@ -122,6 +136,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _bench_lines(main_file(stage, results))
     if stage.kind == "semi_dense":
         return _semi_dense_lines(main_file(stage, results), stage.drawn)
+    if stage.kind == "convergence":
+        return _convergence_lines(main_file(stage, results), stage.table_start["px"])
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
     return []

@@ -12,7 +12,7 @@ SWEEPS = [yaml.safe_load(path.read_text()) for path in (PROJECT / "paper" / "swe
 COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_columns(sweep)]
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
-RENDERED = ["fig1", "fig2", "fig3", "scenes", "sequences"]  # these need no data set
+RENDERED = ["convergence", "fig1", "fig2", "fig3", "scenes", "sequences"]  # these need no data set
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -23,6 +23,7 @@ FILES = {
     ]
     + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
+    + ["convergence.csv", "convergence.md"]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
@@ -56,6 +57,7 @@ def test_everything_is_made_once_and_then_up_to_date(project):
         assert f"debian_pairs all, encoded, {where}, pm" in summary
     assert "motorcycle_741x500: sgf_bm 2.29 times cv::StereoBM (avx3, 1 thread)" in summary
     assert "motorcycle_741x500: sgf_sgm 1.20 times cv::StereoSGBM (avx3, 1 thread)" in summary
+    assert "light, converged from 2 px, %: photo 90, lssd 89, gn 88, sgf" in summary
     assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
     assert "checked, kept, median / 90th percentile of depth errors: sad 60 %, 1.0 / 20.0 cm" in summary
     assert "sequences      made        figures/sequences.png (.pdf), tables/sequences.md" in summary
@@ -251,7 +253,7 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
 @pytest.mark.parametrize(
     "command, log, lost",
     [
-        ("pair", "pairs.log", ["fig1", "fig3", "scenes"]),
+        ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
         ("sequence", "sequences_run.log", ["sequences"]),
     ],
 )
