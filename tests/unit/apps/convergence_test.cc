@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 constexpr const char* kStudy = R"(
 study:
   points: 60
-  start_px: [1, 6]
+  start_px: [1, 10]
   resamples: 20
 columns:
   photo: {residual: photo, compared: true}
@@ -34,7 +34,7 @@ cases:
   offset: {change: {offset: 40}}
   roll: {roll_deg: 15, motion: se2, start_px: [1], start_deg: [10]}
   scale: {scale: 1.2, motion: similarity, start_px: [1], start_pct: [10]}
-  pyramid: {levels: 3, start_px: [6]}
+  pyramid: {levels: 3, start_px: [10]}
 )";
 
 // Blobs of a few pixels, at grey levels that an offset of 40 does not clip.
@@ -128,8 +128,8 @@ TEST_F(ConvergenceTest, TellsWhatAnOffsetDoesToWhom) {
 
 TEST_F(ConvergenceTest, ReachesFartherWithAPyramid) {
   ASSERT_EQ(Run(kStudy, 2), "no error");
-  EXPECT_GE(Value("pyramid,translation,3,px,6,photo", "converged"),
-            Value("plain,translation,1,px,6,photo", "converged") + 15);
+  EXPECT_GE(Value("pyramid,translation,3,px,10,photo", "converged"),
+            Value("plain,translation,1,px,10,photo", "converged") + 15);
 }
 
 TEST_F(ConvergenceTest, NamesWhatIsWrong) {
@@ -147,7 +147,7 @@ TEST_F(ConvergenceTest, NamesWhatIsWrong) {
               HasSubstr("cases.roll: start_deg needs motion se2 or similarity"));
   EXPECT_THAT(Run(with("scale: 1.2", "scale: 0"), 1),
               HasSubstr("cases.scale: scale must be finite and positive"));
-  EXPECT_THAT(Run(with("start_px: [1, 6]", "start_px: [0]"), 1),
+  EXPECT_THAT(Run(with("start_px: [1, 10]", "start_px: [0]"), 1),
               HasSubstr("cases.plain: starts must be above 0"));
 }
 
