@@ -281,7 +281,7 @@ class DirectAligner::EngineOf : public Engine {
   /// Contributions of whole patches at the end.
   struct Scatter {
     BatchEquations equations;
-    BatchEquations curvature;  ///< with the loss's own second derivative instead of its weight
+    double weight = 0, curvature = 0;  ///< sums over residuals
     Eigen::Matrix<double, kParameters, kParameters> scatter =
         Eigen::Matrix<double, kParameters, kParameters>::Zero();
     int in_view = 0, inliers = 0;
@@ -297,7 +297,8 @@ class DirectAligner::EngineOf : public Engine {
                                                  const float s = r.squaredNorm();
                                                  patch.Add(r, J, loss.Weight(s));
                                                  patch.AddCost(0.5 * loss.Rho(s));
-                                                 sum.curvature.Add(r, J, loss.Curvature(s, kDim));
+                                                 sum.weight += loss.Weight(s);
+                                                 sum.curvature += loss.Curvature(s, kDim);
                                                });
     if (!in_view) return;
     sum.equations += patch;
@@ -323,13 +324,14 @@ class DirectAligner::EngineOf : public Engine {
   void Judge(const ReferenceOf& reference, const Pyramid& current, const State& state,
              const RobustLoss<float>& loss, AlignmentResult& result) const {
     Scatter total;
-    Equations equations, curvature;
+    Equations equations;
     for (const Scatter& batch :
          OverPatches<Scatter>(reference.levels[0], [&](size_t first, Scatter&sum) {
            AddToScatter(reference, current, state, loss, first, sum);
          })) {
       equations += batch.equations;
-      curvature += batch.curvature;
+      total.weight += batch.weight;
+      total.curvature += batch.curvature;
       total.scatter += batch.scatter;
       total.in_view += batch.in_view;
       total.inliers += batch.inliers;
@@ -337,7 +339,7 @@ class DirectAligner::EngineOf : public Engine {
     result.mean_cost = equations.MeanCost();
     result.overlap = reference.points ? double(total.in_view) / double(reference.points) : 0;
     result.inlier_share = total.in_view ? double(total.inliers) / total.in_view : 0;
-    SetCovariance(curvature.H(), total, reference.median_depth, result);
+    SetCovariance(equations.H(), total, reference.median_depth, result);
     result.failure = FailureOf(total.in_view, result);
   }
 
@@ -351,7 +353,11 @@ class DirectAligner::EngineOf : public Engine {
     const double least = eigen.eigenvalues()(0), most = eigen.eigenvalues()(5);
     result.condition = least > 0 ? most / least : std::numeric_limits<double>::infinity();
     if (!(result.condition < 1e15)) return;
-    const auto inverse = H.inverse().eval();
+    // The cost's curvature, less than least squares has it; a redescending loss may even turn it
+    // negative where hardly anything fits.
+    constexpr double kLeastShare = 0.2;
+    const double share = std::clamp(total.curvature / total.weight, kLeastShare, 1.0);
+    const auto inverse = (share * H).inverse().eval();
     result.covariance = (inverse * total.scatter * inverse).template topLeftCorner<6, 6>();
   }
 

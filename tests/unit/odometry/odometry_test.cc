@@ -105,24 +105,23 @@ TEST(Odometry, StartsAnewAfterBeingLostForLong) {
 }
 
 TEST(Odometry, TakesRotationsFromTheGyroscope) {
-  // A turn between two frames that alignment alone takes long to bridge.
+  // One iteration refines a prediction but does not find a turn of 14 degrees.
   const SE3 turned{ExpSO3({0, 0.25, 0}), {0, 0, 0}};
-  const auto track = [&](bool with_gyro) {
+  const auto rotation_error = [&](bool with_gyro) {
     Rehearsal rehearsal;
     OdometryOptions options = Options();
     options.alignment.levels = 1;
-    options.tracking_levels = 1;
+    options.alignment.solver.max_iterations = 1;
     rehearsal.odometry = Odometry(kRig, options);
     rehearsal.Depth(0);
     for (std::int64_t t = 0; with_gyro && t <= kPeriod; t += kPeriod / 10)
       rehearsal.odometry.ProcessGyro(t, {0, 0.25 / 0.05, 0});
     const auto view = rehearsal.world.Render(turned);
-    return rehearsal.odometry.ProcessDepth(kPeriod, view.grey, view.depth_m);
+    const FrameResult result = rehearsal.odometry.ProcessDepth(kPeriod, view.grey, view.depth_m);
+    return LogSO3(result.T_world_cam.R.conjugate() * turned.R).norm();
   };
-  const FrameResult result = track(true);
-  EXPECT_LT(result.iterations, track(false).iterations / 2);
-  EXPECT_EQ(result.state, TrackingState::kTracked);
-  EXPECT_LT(LogSO3(result.T_world_cam.R.conjugate() * turned.R).norm(), 0.003);
+  EXPECT_LT(rotation_error(true), 0.005);
+  EXPECT_GT(rotation_error(false), 0.05);
 }
 
 TEST(Odometry, RefusesBadInputAndGoesOn) {
