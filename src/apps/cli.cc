@@ -46,8 +46,8 @@ void OptionFlags::Add(CLI::App& app, const OptionDoc& doc,
   const std::string unit = doc.unit.empty() ? "" : ", " + doc.unit;
   const std::string text = fmt::format("{} (default {}{})", doc.text, doc.default_value, unit);
   app.add_option_function<std::string>(
-      flag,
-      [this, name = doc.name](const std::string& value) { SetOption(flags_, name, value); }, text);
+      flag, [this, name = doc.name](const std::string& value) { SetOption(flags_, name, value); },
+      text);
 }
 
 std::set<std::string> OptionFlags::Given() const {

@@ -153,7 +153,8 @@ void options_internal::ReadOptionsList(const YAML::Node& node, const std::string
   }
 }
 
-/// Sets an option in a YAML map that ReadOptions() is to read. @param name dotted for a nested option.
+/// Sets an option in a YAML map that ReadOptions() is to read. @param name dotted for a nested
+/// option.
 inline void SetOption(YAML::Node map, const std::string& name, const std::string& value) {
   size_t begin = 0;
   for (size_t dot; (dot = name.find('.', begin)) != std::string::npos; begin = dot + 1)
