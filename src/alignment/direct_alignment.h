@@ -35,8 +35,8 @@ struct AlignmentOptions {
   int levels = 6;
   int smallest_side_px = 20;
   RobustKind loss = RobustKind::kStudentT;
-  SolverOptions solver;
-  LevelOptions image;
+  SolverOptions solver = {};
+  LevelOptions image = {};
   double inlier_correlation = 0.6;
   double min_inlier_share = 0.4;
   double min_overlap = 0.15;

@@ -79,7 +79,7 @@ using BitPlanes = ChannelImage<8>;
 /// How the levels of a pyramid are made.
 struct LevelOptions {
   GradientOperator gradient = GradientOperator::kScharr;
-  metrics::EpsilonOptions epsilon;
+  metrics::EpsilonOptions epsilon = {};
 
   template <class V>
   void VisitFields(V&& visit) {

@@ -82,7 +82,7 @@ TEST_P(EveryResidual, GivesTheSameBitsForAnyNumberOfThreads) {
 
 INSTANTIATE_TEST_SUITE_P(Residuals, EveryResidual,
                          testing::ValuesIn(AllResiduals().begin(), AllResiduals().end()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 TEST(DirectAlignment, SurvivesAChangeOfGainAndOffsetWhereTheResidualDoes) {
   const cv::Mat1b changed = Current(0.4, 25);
