@@ -20,15 +20,6 @@ using Input = PixelAtDepth<float>;
 
 constexpr int kBatch = 64;  // points whose sums are taken together, in order
 
-Vector2<float> RayOf(const Camera& camera, const Eigen::Vector2f& pixel) {
-  return {static_cast<float>((pixel.x() - camera.cx) / camera.fx),
-          static_cast<float>((pixel.y() - camera.cy) / camera.fy)};
-}
-
-SE3 Perturbation(const Eigen::Matrix<double, 6, 1>& delta) {
-  return {ExpSO3(delta.tail<3>()), delta.head<3>()};
-}
-
 }  // namespace
 
 class DirectAligner::Engine {
@@ -84,10 +75,9 @@ class DirectAligner::EngineOf : public Engine {
     const Level& finest = reference->levels.front();
     reference->points = finest.inputs.size() / offsets_.size();
     reference->median_depth = MedianDepth(finest.inputs);
-    for (const Input& input : finest.inputs) {
-      const auto at = pyramid.samples[0].Sample(PixelOf(finest.camera, input)).value;
-      reference->gradients.emplace_back(at[kGradientX], at[kGradientY]);
-    }
+    for (const Input& input : finest.inputs)
+      reference->gradients.push_back(
+          GradientOf(pyramid.samples[0].Sample(PixelOf(finest.camera, input)).value));
     return reference;
   }
 
@@ -156,7 +146,7 @@ class DirectAligner::EngineOf : public Engine {
     for (const Eigen::Vector2f& offset : offsets_) {
       const Eigen::Vector2f pixel = centre + offset;
       const float scale = static_cast<float>(1 << l);  // px of full size in one of the level
-      level.inputs.push_back({RayOf(level.camera, pixel),
+      level.inputs.push_back({RayOf<float>(level.camera, pixel),
                               point.inverse_depth + scale * point.slope.dot(offset),
                               scale * point.slope});
       level.pixels.push_back(
@@ -229,7 +219,7 @@ class DirectAligner::EngineOf : public Engine {
 
   static State Step(const State& state, const typename Equations::Parameters& delta) {
     State next = state;
-    next.warp = {state.warp.camera, Perturbation(delta.template head<6>()) * state.warp.T_cur_ref};
+    next.warp.Update(delta.template head<6>());
     if constexpr (Residual::kExtraParameters == 2) next.residual.Update(delta.template tail<2>());
     return next;
   }
@@ -315,8 +305,7 @@ class DirectAligner::EngineOf : public Engine {
       Warp::Point point;
       warp.At(reference.levels[0].inputs[k], point);
       const auto at = current.samples[0].Sample(point.pixel).value;
-      const Vector2<float> g(at[kGradientX], at[kGradientY]);
-      correlation.Add(point.A().transpose() * g, reference.gradients[k]);
+      correlation.Add(point.A().transpose() * GradientOf(at), reference.gradients[k]);
     }
     return correlation.Value();
   }

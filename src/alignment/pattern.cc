@@ -36,7 +36,7 @@ std::span<const Eigen::Vector2f> Offsets(Pattern pattern) {
   static const std::vector<Eigen::Vector2f> kSquare25 = Grid(2, 1, 3);
   // Centres of the 2 x 2 blocks of a 16 x 16 square that lie in a disc: rows of 4, 6, 8, 8, 8, 8, 6
   // and 4.
-  static const std::vector<Eigen::Vector2f> kBasalt52 = Grid(7, 2, 8.7f);
+  static const std::vector<Eigen::Vector2f> kBasalt52 = Grid(7, 2, 8);
   switch (pattern) {
     case Pattern::kPoint:
       return kPoint;

@@ -17,6 +17,18 @@
 /// sample to pixel to warp stands here and nowhere else.
 namespace sgf::alignment {
 
+/// Gradient at a place, as its channels have it.
+template <class T>
+Vector2<T> GradientOf(const Eigen::Array<T, 4, 1>& channels) {
+  return {channels[kGradientX], channels[kGradientY]};
+}
+
+/// Derivative of the intensity by what the place depends on, with J the derivative of the place.
+template <class T, class Jacobian>
+auto IntensityAlong(const ChannelsAt<T, 4>& at, const Jacobian& J) {
+  return (at.d_x[kIntensity] * J.row(0) + at.d_y[kIntensity] * J.row(1)).eval();
+}
+
 /// A pixel of the current image seen from the reference: its sample with the gradient carried
 /// there, and how that depends on the warp's parameters.
 template <class T, int P>
@@ -32,8 +44,7 @@ struct CarriedSample {
 template <class T>
 metrics::Sample<T> CarrySample(const Eigen::Array<T, 4, 1>& channels,
                                const Eigen::Matrix<T, 2, 2>& A) {
-  const Vector2<T> g(channels[kGradientX], channels[kGradientY]);
-  const Vector2<T> carried = A.transpose() * g;
+  const Vector2<T> carried = A.transpose() * GradientOf(channels);
   return metrics::MakeSample<T>(channels[kIntensity], carried.x(), carried.y(),
                                 static_cast<double>(channels[kEpsilon] * A.squaredNorm() / T(2)));
 }
@@ -49,13 +60,12 @@ auto CarryWithDerivative(const ChannelsAt<T, 4>& at, const Point& point) {
   const auto J = point.Jacobian();
   constexpr int P = decltype(J)::ColsAtCompileTime;
   const Eigen::Matrix<T, 2, 2> A = point.A();
-  const Vector2<T> g(at.value[kGradientX], at.value[kGradientY]);
   Eigen::Matrix<T, 2, 2> H;
   H << at.d_x[kGradientX], at.d_y[kGradientX], at.d_x[kGradientY], at.d_y[kGradientY];
   CarriedSample<T, P> carried;
   carried.sample = CarrySample<T>(at.value, A);
-  carried.d_intensity = at.d_x[kIntensity] * J.row(0) + at.d_y[kIntensity] * J.row(1);
-  carried.d_gradient = (A.transpose() * H) * J + point.Turn(g);
+  carried.d_intensity = IntensityAlong(at, J);
+  carried.d_gradient = (A.transpose() * H) * J + point.Turn(GradientOf(at.value));
   return carried;
 }
 
@@ -138,10 +148,8 @@ struct AffinePhotoResidual {
   template <class T, class Point, int P>
   Eigen::Matrix<T, 1, 1> Linearize(const ChannelsAt<T, 4>& at, const Point& point, T reference,
                                    Eigen::Matrix<T, 1, P>& J) const {
-    const auto J_pixel = point.Jacobian();
     const T gain = T(std::exp(alpha));
-    J.template head<P - 2>() =
-        gain * (at.d_x[kIntensity] * J_pixel.row(0) + at.d_y[kIntensity] * J_pixel.row(1));
+    J.template head<P - 2>() = gain * IntensityAlong(at, point.Jacobian());
     J(P - 2) = gain * at.value[kIntensity];
     J(P - 1) = T(1);
     return Value<T>(at.value, {}, reference);
@@ -206,6 +214,19 @@ struct LssdResidual {
 template <class Residual>
 inline constexpr bool kPointwise = !std::is_same_v<Residual, LssdResidual>;
 
+/// Where a warp finds a patch's pixels.
+template <class Warp>
+using WarpedPatch = std::array<typename Warp::Point, kMaxPatternPixels>;
+
+/// Warps the pixels of a patch. @return whether the whole patch is in view.
+template <class Image, class Warp>
+bool WarpPatch(const Image& image, const Warp& warp, std::span<const typename Warp::Input> inputs,
+               WarpedPatch<Warp>& points) {
+  for (size_t k = 0; k < inputs.size(); ++k)
+    if (!warp.At(inputs[k], points[k]) || !image.Inside(points[k].pixel)) return false;
+  return true;
+}
+
 /// Calls sink(k, r) with the residuals of a patch's pixels k, vectors of Residual::kDim.
 /// @param image a ChannelImage, or anything with its Inside() and Sample().
 /// @param inputs, references of the patch's pixels, at most kMaxPatternPixels.
@@ -215,9 +236,8 @@ bool EvaluatePatch(const Residual& residual, const Image& image, const Warp& war
                    std::span<const typename Warp::Input> inputs,
                    std::span<const typename Residual::template Reference<T>> references,
                    Sink&& sink) {
-  std::array<typename Warp::Point, kMaxPatternPixels> points;
-  for (size_t k = 0; k < inputs.size(); ++k)
-    if (!warp.At(inputs[k], points[k]) || !image.Inside(points[k].pixel)) return false;
+  WarpedPatch<Warp> points;
+  if (!WarpPatch(image, warp, inputs, points)) return false;
   if constexpr (kPointwise<Residual>) {
     for (size_t k = 0; k < inputs.size(); ++k)
       sink(k, residual.template Value<T>(image.Sample(points[k].pixel).value, points[k].A(),
@@ -241,9 +261,8 @@ bool LinearizePatch(const Residual& residual, const Image& image, const Warp& wa
                     std::span<const typename Residual::template Reference<T>> references,
                     Sink&& sink) {
   constexpr int P = Warp::kParameters + Residual::kExtraParameters;
-  std::array<typename Warp::Point, kMaxPatternPixels> points;
-  for (size_t k = 0; k < inputs.size(); ++k)
-    if (!warp.At(inputs[k], points[k]) || !image.Inside(points[k].pixel)) return false;
+  WarpedPatch<Warp> points;
+  if (!WarpPatch(image, warp, inputs, points)) return false;
   if constexpr (kPointwise<Residual>) {
     for (size_t k = 0; k < inputs.size(); ++k) {
       Eigen::Matrix<T, Residual::kDim, P> J;
@@ -256,8 +275,7 @@ bool LinearizePatch(const Residual& residual, const Image& image, const Warp& wa
     for (size_t k = 0; k < inputs.size(); ++k) {
       const auto at = image.Sample(points[k].pixel);
       samples[k] = Residual::template MakeReference<T>(at);
-      const auto J = points[k].Jacobian();
-      J_intensity.row(k) = at.d_x[kIntensity] * J.row(0) + at.d_y[kIntensity] * J.row(1);
+      J_intensity.row(k) = IntensityAlong(at, points[k].Jacobian());
     }
     const std::span<const metrics::Sample<T>> current(samples.data(), inputs.size());
     const auto r = metrics::Lssd{}(current, references);

@@ -30,6 +30,18 @@ Eigen::Matrix<T, 3, 3> Cross(const Vector3<T>& a) {
       .finished();
 }
 
+/// Camera coordinates at depth 1 of a pixel of a camera without distortion.
+template <class T>
+Vector2<T> RayOf(const Camera& camera, const Vector2<T>& pixel) {
+  return {static_cast<T>((pixel.x() - camera.cx) / camera.fx),
+          static_cast<T>((pixel.y() - camera.cy) / camera.fy)};
+}
+
+/// The motion (exp(w), v) of v (m) before w (rad).
+inline SE3 Perturbation(const Eigen::Matrix<double, 6, 1>& delta) {
+  return {ExpSO3(delta.tail<3>()), delta.head<3>()};
+}
+
 /// W(u) = centre + offset + p: parameters (x, y), px.
 template <class T>
 struct TranslationWarp {
@@ -224,10 +236,9 @@ struct Se3Warp {
     point.slope = u.slope;
     return projector(u, point);
   }
-  void Update(const Parameters& delta) {
-    const Eigen::Matrix<double, 6, 1> d = delta.template cast<double>();
-    T_cur_ref = SE3{ExpSO3(d.tail<3>()), d.head<3>()} * T_cur_ref;
-    projector = {camera, T_cur_ref};
+  /// The motion is kept in double precision whatever T.
+  void Update(const Eigen::Matrix<double, 6, 1>& delta) {
+    *this = {camera, Perturbation(delta) * T_cur_ref};
   }
 };
 

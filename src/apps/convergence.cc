@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -12,6 +11,7 @@
 #include <sgf/apps/cli.h>
 #include <sgf/apps/convergence.h>
 #include <sgf/apps/image_change.h>
+#include <sgf/apps/image_motion.h>
 #include <sgf/core/parallel.h>
 #include <sgf/core/random.h>
 #include <sgf/eval/statistics.h>
@@ -33,6 +33,7 @@ namespace {
 using alignment::SampleChannels;
 using Vector2 = alignment::Vector2<double>;
 
+constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kLost = std::numeric_limits<double>::infinity();
 
 struct Case {
@@ -161,68 +162,16 @@ Study ReadStudy(const std::string& file) {
 
 // --- Images and points ---
 
-// Weights of the four pixels around a place, `t` in [0, 1) after the second: cubic convolution with
-// a = -1/2 (Keys, "Cubic convolution interpolation for digital image processing", 1981). Only that
-// one keeps straight ramps; OpenCV's a = -3/4 would move the image by up to 0.03 px.
-std::array<double, 4> CubicWeights(double t) {
-  const double t2 = t * t, t3 = t2 * t;
-  return {0.5 * (-t3 + 2 * t2 - t), 0.5 * (3 * t3 - 5 * t2 + 2), 0.5 * (-3 * t3 + 4 * t2 + t),
-          0.5 * (t3 - t2)};
-}
-
-// Grey level at a place; the border is replicated.
-double SampleCubic(const cv::Mat1b& image, const Vector2& p) {
-  const int x = static_cast<int>(std::floor(p.x())), y = static_cast<int>(std::floor(p.y()));
-  const auto wx = CubicWeights(p.x() - x), wy = CubicWeights(p.y() - y);
-  double sum = 0;
-  for (int j = 0; j < 4; ++j) {
-    const uchar* row = image[std::clamp(y + j - 1, 0, image.rows - 1)];
-    for (int i = 0; i < 4; ++i)
-      sum += wy[j] * wx[i] * row[std::clamp(x + i - 1, 0, image.cols - 1)];
-  }
-  return sum;
-}
-
-// Where a pixel of the first image is in the second.
-class TrueMotion {
- public:
-  TrueMotion(const ConvergenceOptions& options, const Case& run, cv::Size size)
-      : angle_(run.roll_deg * std::numbers::pi / 180),
-        scale_(run.scale),
-        A_(scale_ * Eigen::Rotation2Dd(angle_).toRotationMatrix()),
-        centre_((size.width - 1) / 2.0, (size.height - 1) / 2.0),
-        shift_(options.shift_x, options.shift_y) {}
-
-  double angle() const { return angle_; }
-  double scale() const { return scale_; }
-  Vector2 operator()(const Vector2& p) const { return centre_ + shift_ + A_ * (p - centre_); }
-
-  cv::Mat1b Apply(const cv::Mat1b& image) const {
-    const Eigen::Matrix2d back = A_.inverse();
-    cv::Mat1b moved(image.size());
-    for (int y = 0; y < image.rows; ++y)
-      for (int x = 0; x < image.cols; ++x) {
-        const Vector2 p = centre_ + back * (Vector2(x, y) - centre_ - shift_);
-        moved(y, x) = cv::saturate_cast<uchar>(SampleCubic(image, p));
-      }
-    return moved;
-  }
-
- private:
-  double angle_, scale_;
-  Eigen::Matrix2d A_;
-  Vector2 centre_, shift_;
-};
-
 // An image and its copy, as grey pyramids.
 struct GreyPair {
   std::vector<cv::Mat1f> first, second;
-  TrueMotion motion;
+  ImageMotion motion;
 };
 
 GreyPair MakeGreyPair(const cv::Mat1b& image, const ConvergenceOptions& options, const Case& run,
                       uint64_t seed) {
-  const TrueMotion motion(options, run, image.size());
+  const ImageMotion motion(run.roll_deg * kDegree, run.scale, {options.shift_x, options.shift_y},
+                           image.size());
   ImageChange noise_only;
   noise_only.noise = run.change.noise;
   noise_only.quantise = run.change.quantise;
@@ -267,7 +216,7 @@ double Margin(const ConvergenceOptions& options, const Case& run) {
 }
 
 // Pixels whose patches lie inside both images, wherever they start.
-cv::Mat1b Eligible(cv::Size size, const TrueMotion& motion, double margin) {
+cv::Mat1b Eligible(cv::Size size, const ImageMotion& motion, double margin) {
   const auto inside = [&](const Vector2& p) {
     return p.x() >= margin && p.y() >= margin && p.x() < size.width - 1 - margin &&
            p.y() < size.height - 1 - margin;
@@ -301,7 +250,7 @@ std::vector<TrackedPoint> ChoosePoints(const std::vector<GreyPair>& pairs, const
 // --- Tracking ---
 
 template <class Warp>
-Warp TrueWarp(const TrueMotion& motion, const Vector2& place) {
+Warp TrueWarp(const ImageMotion& motion, const Vector2& place) {
   Warp warp;
   warp.centre = motion(place);
   if constexpr (Warp::kParameters >= 3) warp.angle = motion.angle();
@@ -314,7 +263,7 @@ template <class Warp>
 Warp StartWarp(Warp warp, const Start& start, double u) {
   const double direction = 2 * std::numbers::pi * u, side = u < 0.5 ? -1 : 1;
   warp.centre += start.px * Vector2(std::cos(direction), std::sin(direction));
-  if constexpr (Warp::kParameters >= 3) warp.angle += side * start.deg * std::numbers::pi / 180;
+  if constexpr (Warp::kParameters >= 3) warp.angle += side * start.deg * kDegree;
   if constexpr (Warp::kParameters == 4) warp.log_scale += side * std::log1p(start.pct / 100);
   return warp;
 }

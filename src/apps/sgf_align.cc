@@ -15,6 +15,7 @@
 #include <sgf/apps/cli.h>
 #include <sgf/apps/sequence_change.h>
 #include <sgf/core/provenance.h>
+#include <sgf/eval/statistics.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/image.h>
 #include <sgf/io/odometry_dataset.h>
@@ -189,12 +190,6 @@ void WriteTimings(const fs::path& file, const Run& run) {
   WriteTextFile(file, text);
 }
 
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  std::sort(values.begin(), values.end());
-  return values[std::min(values.size() - 1, static_cast<size_t>(share * double(values.size())))];
-}
-
 void WriteSummary(const fs::path& file, const FrameSource& source, const Run& run) {
   int keyframes = 0;
   std::vector<double> total_ms;
@@ -212,7 +207,7 @@ void WriteSummary(const fs::path& file, const FrameSource& source, const Run& ru
   spdlog::info("{} of {} frames have a pose, {} key-frames, {:.2f} % of pixels clipped",
                run.trajectory.size(), run.frames.size(), keyframes, 100 * source.clipped_share());
   spdlog::info("a frame took {:.1f} ms in the median, {:.1f} ms at the 99th percentile",
-               Quantile(total_ms, 0.5), Quantile(total_ms, 0.99));
+               Median(total_ms), Quantile(total_ms, 0.99));
 }
 
 void WriteRunOptions(const fs::path& file, const AlignOptions& options) {

@@ -29,6 +29,13 @@ double Median(std::vector<double> values) {
   return 0.5 * (*middle + *std::max_element(values.begin(), middle));
 }
 
+double Quantile(std::vector<double> values, double share) {
+  if (values.empty()) return kNan;
+  const auto place = std::lround(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + place, values.end());
+  return values[static_cast<size_t>(place)];
+}
+
 Interval MedianInterval(std::span<const double> values, int resamples, uint64_t seed) {
   if (values.empty()) return {kNan, kNan};
   std::vector<double> medians, sample(values.size());
@@ -38,11 +45,7 @@ Interval MedianInterval(std::span<const double> values, int resamples, uint64_t 
       sample[k] = values[Hash64(stream, k) % values.size()];
     medians.push_back(Median(sample));
   }
-  std::sort(medians.begin(), medians.end());
-  const auto at = [&](double share) {
-    return medians[static_cast<size_t>(std::lround(share * static_cast<double>(resamples - 1)))];
-  };
-  return {at(0.025), at(0.975)};
+  return {Quantile(medians, 0.025), Quantile(medians, 0.975)};
 }
 
 }  // namespace sgf

@@ -65,7 +65,7 @@ class GyroBuffer {
   }
 
   /// Rotation R_from_to, each rate holding until the next; none where samples do not span the time.
-  /// Drops what lies before `to_ns`.
+  /// Drops what lies before `from_ns`.
   std::optional<Eigen::Quaterniond> Integrate(std::int64_t from_ns, std::int64_t to_ns) {
     while (samples_.size() > 1 && samples_[1].time_ns <= from_ns) samples_.pop_front();
     constexpr std::int64_t kMostGap = 20'000'000;
@@ -181,7 +181,7 @@ class Odometry::Impl {
     result.times.alignment_s = stage.Lap();
     lost_frames_ = result.state == TrackingState::kLost ? lost_frames_ + 1 : 0;
     if (lost_frames_ > options_.lost_frames) result.state = TrackingState::kInitialised;
-    if (NeedsKeyframe(result)) AddKeyframe(pyramid, grey, make_points, result);
+    if (NeedsKeyframe(result)) AddKeyframe(pyramid, make_points, result);
     Remember(result);
     result.times.total_s = total.Lap();
     return result;
@@ -236,25 +236,16 @@ class Odometry::Impl {
             result.keyframe != references_.back().index);
   }
 
-  void AddKeyframe(const alignment::Pyramid& pyramid, const cv::Mat& grey,
-                   const MakePoints& make_points, FrameResult& result) {
-    const Points points = make_points(pyramid, result.times);
+  void AddKeyframe(const alignment::Pyramid& pyramid, const MakePoints& make_points,
+                   FrameResult& result) {
+    Points points = make_points(pyramid, result.times);
     if (static_cast<int>(points.size()) < options_.alignment.min_points) {
       if (result.state == TrackingState::kInitialised) result.state = TrackingState::kLost;
       return;
     }
     Stopwatch stage;
     Reference reference{.index = keyframes_++, .patches = aligner_.MakeReference(pyramid, points)};
-    reference.keyframe.time_ns = result.time_ns;
-    reference.keyframe.T_world_cam = result.T_world_cam;
-    for (const alignment::ReferencePoint& point : points) {
-      const double depth = 1.0 / point.inverse_depth;
-      reference.keyframe.points.push_back(depth *
-                                          rig_.camera.Unproject(point.pixel.cast<double>()));
-      reference.keyframe.pixels.push_back(point.pixel);
-      reference.keyframe.grey.push_back(
-          grey.at<uint8_t>(static_cast<int>(point.pixel.y()), static_cast<int>(point.pixel.x())));
-    }
+    reference.keyframe = {result.time_ns, result.T_world_cam, std::move(points)};
     references_.push_back(std::move(reference));
     if (static_cast<int>(references_.size()) > std::max(1, options_.relocation_keyframes))
       references_.pop_front();

@@ -109,9 +109,7 @@ struct FrameResult {
 struct Keyframe {
   std::int64_t time_ns = 0;
   SE3 T_world_cam = {};
-  std::vector<Eigen::Vector3d> points;  ///< in camera coordinates, m
-  std::vector<Eigen::Vector2f> pixels;  ///< of the points, px
-  std::vector<float> grey;              ///< of the points, grey levels
+  std::vector<alignment::ReferencePoint> points;
 };
 
 /// Visual odometry against the last key-frame. Frames are handed over one at a time, in the order
@@ -135,8 +133,8 @@ class Odometry {
   FrameResult ProcessDepth(std::int64_t time_ns, const cv::Mat& grey, const cv::Mat1f& depth_m);
 
   /// Takes an angular rate for the prediction of the next frame's rotation.
-  /// @param gyro rad/s in camera coordinates. Samples come in the order of their times; those not
-  ///   after the last frame's time are ignored.
+  /// @param gyro rad/s in camera coordinates. Samples come in the order of their times; one that
+  ///   is not after the one before is ignored.
   void ProcessGyro(std::int64_t time_ns, const Eigen::Vector3d& gyro);
 
   /// The last key-frame. @throws Error before the first frame.

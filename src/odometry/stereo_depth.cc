@@ -47,10 +47,7 @@ class Refiner {
   using Patch = alignment::Patch<Residual, Warp>;
 
   Warp::Input InputAt(const alignment::ReferencePoint& point, const Eigen::Vector2f& offset) const {
-    const Eigen::Vector2f pixel = point.pixel + offset;
-    return {{static_cast<float>((pixel.x() - camera_.cx) / camera_.fx),
-             static_cast<float>((pixel.y() - camera_.cy) / camera_.fy)},
-            point.slope.dot(offset),
+    return {alignment::RayOf<float>(camera_, point.pixel + offset), point.slope.dot(offset),
             point.slope};
   }
 
@@ -66,8 +63,7 @@ class Refiner {
   }
 
   static Eigen::Vector2f GradientAt(const SampleChannels& image, const Eigen::Vector2f& pixel) {
-    const auto value = image.Sample(pixel).value;
-    return {value[alignment::kGradientX], value[alignment::kGradientY]};
+    return alignment::GradientOf(image.Sample(pixel).value);
   }
 
   const SampleChannels& left_;

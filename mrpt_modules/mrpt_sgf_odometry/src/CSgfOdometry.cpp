@@ -11,7 +11,6 @@
 #include <sstream>
 #include <vector>
 
-#include <sgf/io/trajectory.h>
 #include <sgf/odometry/odometry.h>
 
 #include "conversions.h"
@@ -98,62 +97,6 @@ bool believable(const FrameResult& r)
 const char* describe(TSkipReason reason)
 {
 	return kReasons.at(static_cast<size_t>(reason));
-}
-
-void saveTrajectoryTUM(
-	const mrpt::poses::CPose3DInterpolator& path, const std::string& file)
-{
-	std::vector<::sgf::TimedPose> poses;
-	for (const auto& [time, pose] : path)
-		poses.push_back(
-			{toNanoseconds(time), toSE3(mrpt::poses::CPose3D(pose))});
-	::sgf::WriteTrajectory(file, poses);
-}
-
-// ---------------------------------------------------------------------------
-// TResult
-
-mrpt::obs::CActionRobotMovement3D TResult::asAction() const
-{
-	ASSERTMSG_(increment, "frame without increment");
-	mrpt::obs::CActionRobotMovement3D action;
-	action.timestamp = timestamp;
-	action.poseChange = *increment;
-	action.rawOdometryIncrementReading = increment->mean;
-	action.estimationMethod =
-		mrpt::obs::CActionRobotMovement3D::emVisualOdometry;
-	return action;
-}
-
-mrpt::obs::CObservationRobotPose::Ptr TResult::asRobotPose(
-	const std::string& sensorLabel) const
-{
-	ASSERTMSG_(pose, "frame without pose");
-	auto obs = mrpt::obs::CObservationRobotPose::Create();
-	obs->timestamp = timestamp;
-	obs->sensorLabel = sensorLabel;
-	obs->pose = *pose;
-	return obs;
-}
-
-mrpt::obs::CObservationOdometry::Ptr TResult::asOdometry(
-	const std::string& sensorLabel) const
-{
-	ASSERTMSG_(pose, "frame without pose");
-	auto obs = mrpt::obs::CObservationOdometry::Create();
-	obs->timestamp = timestamp;
-	obs->sensorLabel = sensorLabel;
-	obs->odometry = mrpt::poses::CPose2D(pose->mean);
-	return obs;
-}
-
-mrpt::obs::CSensoryFrame::Ptr TResult::asSensoryFrame(
-	const std::string& sensorLabel) const
-{
-	auto frame = mrpt::obs::CSensoryFrame::Create();
-	if (pose) frame->insert(asRobotPose(sensorLabel));
-	if (keyframePoints) frame->insert(keyframePoints);
-	return frame;
 }
 
 // ---------------------------------------------------------------------------
@@ -332,15 +275,18 @@ CObservation3DRangeScan::Ptr CSgfOdometry::Impl::keyframePoints() const
 	scan->resizePoints3DVectors(keyframe.points.size());
 	for (size_t i = 0; i < keyframe.points.size(); ++i)
 	{
+		const auto& [pixel, inverse_depth, slope] = keyframe.points[i];
 		const Eigen::Vector3f p =
-			(R_sensor_cam * keyframe.points[i]).cast<float>();
+			(R_sensor_cam * camera.Unproject(pixel.cast<double>()) /
+			 inverse_depth)
+				.cast<float>();
 		scan->points3D_x[i] = p.x();
 		scan->points3D_y[i] = p.y();
 		scan->points3D_z[i] = p.z();
 		scan->points3D_idxs_x[i] =
-			static_cast<uint16_t>(keyframe.pixels[i].x() + 0.5f);
+			static_cast<uint16_t>(pixel.x() + 0.5f);
 		scan->points3D_idxs_y[i] =
-			static_cast<uint16_t>(keyframe.pixels[i].y() + 0.5f);
+			static_cast<uint16_t>(pixel.y() + 0.5f);
 		scan->maxRange = std::max(scan->maxRange, p.x());
 	}
 	return scan;

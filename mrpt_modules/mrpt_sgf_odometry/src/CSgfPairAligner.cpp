@@ -53,13 +53,7 @@ std::vector<ReferencePoint> pointsOf(const TFrame& frame, Odometry odometry)
 		odometry.ProcessStereo(frame.time_ns, frame.grey, frame.right);
 	else
 		odometry.ProcessDepth(frame.time_ns, frame.grey, frame.depth);
-	const auto& keyframe = odometry.LastKeyframe();
-	std::vector<ReferencePoint> points;
-	for (size_t i = 0; i < keyframe.points.size(); ++i)
-		points.push_back(
-			{keyframe.pixels[i],
-			 static_cast<float>(1 / keyframe.points[i].z())});
-	return points;
+	return odometry.LastKeyframe().points;
 }
 }  // namespace
 

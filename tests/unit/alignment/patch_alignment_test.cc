@@ -1,3 +1,6 @@
+#include <map>
+#include <set>
+
 #include <gtest/gtest.h>
 #include <unit/alignment/analytic_image.h>
 
@@ -21,6 +24,18 @@ cv::Mat1f Transformed(double angle, double scale, const Vector2<double>& shift) 
       out(y, x) = static_cast<float>(image.Intensity(p.x(), p.y()));
     }
   return out;
+}
+
+TEST(Pattern, HasItsPixels) {
+  std::map<Pattern, std::set<std::pair<float, float>>> pixels;
+  for (const auto& [name, pattern] : EnumNames(Pattern{}))
+    for (const Eigen::Vector2f& offset : Offsets(pattern))
+      EXPECT_TRUE(pixels[pattern].emplace(offset.x(), offset.y()).second) << name << " repeats";
+  EXPECT_EQ(pixels[Pattern::kPoint].size(), 1u);
+  EXPECT_EQ(pixels[Pattern::kDso8].size(), 8u);
+  EXPECT_EQ(pixels[Pattern::kCross17].size(), 17u);
+  EXPECT_EQ(pixels[Pattern::kSquare25].size(), 25u);
+  EXPECT_EQ(pixels[Pattern::kBasalt52].size(), 52u);
 }
 
 /// Mean distance between found and true places of patches, as a vector: the bias.

@@ -36,6 +36,13 @@ TEST(Median, IsTheMiddle) {
   EXPECT_TRUE(std::isnan(Median({})));
 }
 
+TEST(Quantile, IsTheNearestOfTheSortedValues) {
+  EXPECT_EQ(Quantile({5, 1, 3, 2, 4}, 0), 1);
+  EXPECT_EQ(Quantile({5, 1, 3, 2, 4}, 0.3), 2);
+  EXPECT_EQ(Quantile({5, 1, 3, 2, 4}, 1), 5);
+  EXPECT_TRUE(std::isnan(Quantile({}, 0.5)));
+}
+
 TEST(MedianInterval, IsThatOfTheOrderStatistics) {
   std::vector<double> values(401);
   std::iota(values.begin(), values.end(), 0);

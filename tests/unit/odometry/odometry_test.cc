@@ -74,10 +74,10 @@ TEST(Odometry, MakesKeyframesAndTellsOfThem) {
   EXPECT_TRUE(first.new_keyframe);
   const Keyframe keyframe = rehearsal.odometry.LastKeyframe();
   ASSERT_GT(keyframe.points.size(), 200u);
-  ASSERT_EQ(keyframe.points.size(), keyframe.pixels.size());
-  for (size_t i = 0; i < keyframe.points.size(); ++i)
-    EXPECT_LT((kRig.camera.Project(keyframe.points[i]) - keyframe.pixels[i].cast<double>()).norm(),
-              1e-3);
+  const cv::Mat1f depth_m = rehearsal.world.Render({}).depth_m;
+  for (const alignment::ReferencePoint& point : keyframe.points)
+    EXPECT_FLOAT_EQ(1 / point.inverse_depth,
+                    depth_m(cv::Point(cv::Point2f(point.pixel.x(), point.pixel.y()))));
 }
 
 TEST(Odometry, SaysWhenItIsLostAndFindsItsWayBack) {
@@ -147,8 +147,8 @@ TEST(Odometry, IgnoresDepthThatIsNone) {
   for (int y = 0; y < view.depth_m.rows; ++y)
     for (int x = 0; x < view.depth_m.cols; x += 2) view.depth_m(y, x) = none[(x / 2 + y) % 4];
   rehearsal.odometry.ProcessDepth(0, view.grey, view.depth_m);
-  for (const Eigen::Vector3d& point : rehearsal.odometry.LastKeyframe().points)
-    EXPECT_TRUE(point.allFinite() && point.z() > 1 && point.z() < 8);
+  for (const alignment::ReferencePoint& point : rehearsal.odometry.LastKeyframe().points)
+    EXPECT_TRUE(1 / point.inverse_depth > 1 && 1 / point.inverse_depth < 8);
   ExpectPose(rehearsal.Depth(1), 1, 0.01);
 }
 
