@@ -17,6 +17,7 @@ FILES = {
     "benchmark": "tables/{}.md (.csv)",
     "contact_sheet": "figures/{}.png (.pdf)",
     "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "odometry": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _compared.csv, _runs.csv)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
@@ -30,6 +31,7 @@ MAIN_FILE = {
     "benchmark": "tables/{}.csv",
     "contact_sheet": "figures/{}.png",
     "convergence": "tables/{}.csv",
+    "odometry": "tables/{}.csv",
     "sequences": "tables/{}.csv",
     "semi_dense": "tables/{}.csv",
     "self_match": "tables/{}.csv",
@@ -127,6 +129,20 @@ def _light_change_lines(path: Path) -> list[str]:
     return lines
 
 
+def _odometry_lines(path: Path) -> list[str]:
+    """Per sequence and condition the columns by their ATE, and how many runs were lost."""
+    frame = pd.read_csv(path)
+    lines = []
+    for (sequence, condition), rows in frame.groupby(["sequence", "condition"], sort=False):
+        order = rows.sort_values("ate_mm", kind="stable")
+        texts = [
+            f"{row.column} {row.ate_mm:.1f}" + (f" ({row.lost}/{row.runs} lost)" if row.lost else "")
+            for row in order.itertuples()
+        ]
+        lines.append(f"{sequence}, {condition}, median ATE mm: {', '.join(texts)}")
+    return lines
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
@@ -138,6 +154,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _semi_dense_lines(main_file(stage, results), stage.drawn)
     if stage.kind == "convergence":
         return _convergence_lines(main_file(stage, results), stage.table_start["px"])
+    if stage.kind == "odometry":
+        return _odometry_lines(main_file(stage, results))
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
     return []

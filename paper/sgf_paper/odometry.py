@@ -1,0 +1,225 @@
+"""Odometry with and without changes of light: which residuals get lost, how exact the others are."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from sgf_paper import config, paired, style, text
+from sgf_paper.config import Odometry
+from sgf_paper.paired import Estimate
+from sgf_paper.style import plt
+
+KEYS = ["sequence", "condition", "column"]
+LINE = [
+    *KEYS, "runs", "lost", "posed_pct", "clipped_pct", "ate_mm", "ate_low_mm", "ate_high_mm",
+    "ratio", "ratio_low", "ratio_high", "ratio_runs",
+    "rpe_half_second_mm", "rpe_one_second_mm", "rpe_one_second_deg", "orientation_deg",
+]  # fmt: skip
+COMPARED = [
+    "sequence", "condition", "column", "baseline", "runs", "ratio", "ratio_low", "ratio_high", "verdict",
+]  # fmt: skip
+LENGTHS = ["ate", "rpe_half_second", "rpe_one_second"]
+ERRORS = [*(f"{name}_mm" for name in LENGTHS), "rpe_one_second_deg", "orientation_deg"]
+COLOURS = ["#0072B2", "#D55E00", *style.EXTRA_COLOURS]  # of the conditions
+PANEL_COLUMNS = 2
+
+
+def read_runs(study: Odometry, raw: Path, sequences: list[str], runs: int) -> pd.DataFrame:
+    """A line per run; errors in mm and degrees, infinite where a run is lost."""
+    frames = []
+    for sequence in sequences:
+        for run in range(runs):
+            frame = pd.read_csv(raw / sequence / f"run_{run}" / "scores.csv")
+            frames.append(frame.assign(sequence=sequence, run=run, first_frame=run % study.first_frames))
+    table = pd.concat(frames, ignore_index=True)
+    for name in LENGTHS:
+        table[f"{name}_mm"] = 1000 * table.pop(f"{name}_m")
+    table.loc[table["lost"], ERRORS] = np.inf
+    columns = [*KEYS, "run", "first_frame", "frames", "posed", "lost", "clipped_pct", "compared", *ERRORS]
+    return table[columns].astype({"compared": "Int64"})
+
+
+def _ate(runs: pd.DataFrame, sequence: str, condition: str, column: str) -> np.ndarray:
+    """ATE of all runs in their order, mm."""
+    own = runs["sequence"].eq(sequence) & runs["condition"].eq(condition) & runs["column"].eq(column)
+    return runs[own].sort_values("run")["ate_mm"].to_numpy()
+
+
+def _ratio_fields(ratio: Estimate) -> dict[str, float]:
+    return {"ratio": ratio.median, "ratio_low": ratio.low, "ratio_high": ratio.high}
+
+
+def make_table(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
+    """A line per sequence, condition and column: medians over runs, means of shares."""
+    lines = []
+    for (sequence, condition, column), own in runs.groupby(KEYS, sort=False):
+        errors = _ate(runs, sequence, condition, column)
+        ate = paired.estimate_median(errors)
+        unchanged = _ate(runs, sequence, study.undisturbed, column)
+        ratio = paired.estimate_median(paired.ratios(errors, unchanged))
+        lines.append({
+            **dict(zip(KEYS, (sequence, condition, column))),
+            "runs": len(own),
+            "lost": int(own["lost"].sum()),
+            "posed_pct": (100 * own["posed"] / own["frames"]).mean(),
+            "clipped_pct": own["clipped_pct"].mean(),
+            **own[ERRORS].median(),
+            "ate_low_mm": ate.low,
+            "ate_high_mm": ate.high,
+            **_ratio_fields(ratio),
+            "ratio_runs": ratio.runs,
+        })  # fmt: skip
+    return pd.DataFrame(lines, columns=LINE)
+
+
+def compare(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
+    """The compared columns against the baselines, run by run."""
+    lines = []
+    for sequence, condition in runs[["sequence", "condition"]].drop_duplicates().itertuples(index=False):
+        for column in study.compared:
+            for baseline in study.baselines:
+                both = (_ate(runs, sequence, condition, name) for name in (column, baseline))
+                ratio = paired.estimate_median(paired.ratios(*both))
+                lines.append({
+                    **dict(zip(COMPARED, (sequence, condition, column, baseline, ratio.runs))),
+                    **_ratio_fields(ratio),
+                    "verdict": paired.verdict(ratio, study.verdict_runs, study.margin_pct),
+                })  # fmt: skip
+    return pd.DataFrame(lines, columns=COMPARED)
+
+
+def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, colour: str, top: float) -> None:
+    """Each run as a dot, their median and its interval; lost runs as a cross at the top."""
+    kept = lines[~lines["lost"]]["ate_mm"]
+    axis.plot([place] * len(kept), kept, ".", color=colour, markersize=3, alpha=0.6, zorder=2)
+    median = paired.estimate_median(lines["ate_mm"].to_numpy())
+    if np.isfinite(median.median):
+        axis.plot([place - 0.13, place + 0.13], [median.median] * 2, color=colour, linewidth=2, zorder=3)
+        axis.plot([place] * 2, [median.low, min(median.high, top)], color=colour, linewidth=0.8)
+    if lines["lost"].any():
+        axis.plot(place, top, "x", color=colour, markersize=5, clip_on=False, zorder=4)
+        axis.annotate(
+            f"{lines['lost'].sum()}/{len(lines)}", (place, top), (0, 5), textcoords="offset points",
+            ha="center", color=colour, fontsize=6, annotation_clip=False,
+        )  # fmt: skip
+
+
+def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
+    finite = lines.loc[~lines["lost"], "ate_mm"]
+    top = 1.5 * finite.max()
+    shift = 0.8 / len(study.conditions)
+    for place, column in enumerate(study.columns):
+        for index, condition in enumerate(study.conditions):
+            own = lines[(lines["column"] == column) & (lines["condition"] == condition)]
+            centre = place + shift * (index - (len(study.conditions) - 1) / 2)
+            _draw_column(axis, own, centre, COLOURS[index % len(COLOURS)], top)
+    axis.set_yscale("log")
+    axis.set_ylim(0.7 * finite.min(), top)
+    axis.yaxis.set_major_formatter(plt.matplotlib.ticker.FormatStrFormatter("%g"))
+    axis.yaxis.set_minor_formatter(plt.matplotlib.ticker.NullFormatter())
+    axis.set_xticks(range(len(study.columns)), list(study.columns), rotation=25, ha="right")
+    axis.tick_params(axis="x", length=0)
+    axis.grid(axis="y", which="both", alpha=0.3, linewidth=0.5)
+    axis.set_axisbelow(True)
+
+
+def draw(study: Odometry, runs: pd.DataFrame) -> plt.Figure:
+    """ATE of all runs by column, a panel per sequence, the conditions beside one another."""
+    sequences = list(runs["sequence"].unique())
+    rows = -(-len(sequences) // PANEL_COLUMNS)
+    drawing, axes = plt.subplots(
+        rows, PANEL_COLUMNS, figsize=(9, 2.6 * rows + 0.6), squeeze=False, layout="constrained"
+    )
+    for axis, sequence in zip(axes.flat, sequences):
+        _draw_panel(axis, study, runs[runs["sequence"] == sequence])
+        axis.set_title(sequence, pad=14)
+        axis.set_ylabel("ATE RMSE, mm")
+    for axis in axes.flat[len(sequences) :]:
+        axis.set_visible(False)
+    handles = [plt.Line2D([], [], color=colour, linewidth=2) for colour in COLOURS]
+    drawing.legend(handles, list(study.conditions), loc="outside lower center", ncol=4, frameon=False)
+    count = runs["run"].nunique()
+    drawing.suptitle(f"{study.title}\n{count} runs each; bars: medians; crosses: how many runs were lost")
+    return drawing
+
+
+def _estimate(median: float, low: float, high: float, decimals: int) -> str:
+    """A median and its interval; – without one, ∞ where the run in the middle is lost."""
+    if median != median:
+        return "–"
+    shown = (f"{value:.{decimals}f}".replace("inf", "∞") for value in (median, low, high))
+    return "{} [{}, {}]".format(*shown)
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}".replace("inf", "∞")
+
+
+def _row(line: object) -> dict[str, str]:
+    return {
+        "column": line.column,
+        "lost": f"{line.lost}/{line.runs}",
+        "posed": _number(line.posed_pct, 1),
+        "clipped": _number(line.clipped_pct, 2),
+        "ate": _estimate(line.ate_mm, line.ate_low_mm, line.ate_high_mm, 1),
+        "ratio": _estimate(line.ratio, line.ratio_low, line.ratio_high, 2),
+        "rpe": _number(line.rpe_one_second_mm, 1),
+        "orientation": _number(line.orientation_deg, 2),
+    }
+
+
+def make_blocks(table: pd.DataFrame) -> list[dict]:
+    """The table as text: a block per sequence and condition."""
+    return [
+        {"sequence": sequence, "condition": condition, "rows": [_row(line) for line in lines.itertuples()]}
+        for (sequence, condition), lines in table.groupby(["sequence", "condition"], sort=False)
+    ]
+
+
+def _compared_rows(compared: pd.DataFrame) -> list[dict]:
+    return [
+        {**line._asdict(), "ratio": _estimate(line.ratio, line.ratio_low, line.ratio_high, 2)}
+        for line in compared.itertuples()
+    ]
+
+
+def make_odometry(
+    name: str, raw: Path, sequences: list[str], runs: int, tables: Path, figures: Path
+) -> None:
+    """Makes <name>.csv, _compared.csv, _runs.csv, .md and the figure."""
+    study = config.load_experiment(name)
+    lines = read_runs(study, raw, sequences, runs)
+    table, compared = make_table(study, lines), compare(study, lines)
+    text.write_csv(table, tables / f"{name}.csv")
+    text.write_csv(compared, tables / f"{name}_compared.csv")
+    text.write_csv(lines, tables / f"{name}_runs.csv")
+    document = text.render(
+        "odometry.md.j2",
+        study=study,
+        runs=runs,
+        sequences={sequence: study.sequences[sequence] for sequence in sequences},
+        blocks=make_blocks(table),
+        compared=_compared_rows(compared),
+    )
+    (tables / f"{name}.md").write_text(document)
+    style.save(draw(study, lines), figures, name)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("name", help="experiment of paper/experiments")
+    parser.add_argument("--raw", type=Path, required=True, help="folder of the scores of its runs")
+    parser.add_argument("--sequences", nargs="+", required=True, help="names of those that were run")
+    parser.add_argument("--runs", type=int, required=True, help="number of runs of each column")
+    parser.add_argument("--tables", type=Path, required=True, help="folder for the tables")
+    parser.add_argument("--figures", type=Path, required=True, help="folder for the figure")
+    a = parser.parse_args()
+    make_odometry(a.name, a.raw, a.sequences, a.runs, a.tables, a.figures)
+
+
+if __name__ == "__main__":
+    main()
