@@ -20,6 +20,7 @@ SWEEPS = PAPER / "sweeps"
 PUBLISHED = PAPER / "published.yaml"
 RECIPES = PROJECT / "datasets" / "synthetic"
 CATALOGUE = PROJECT / "datasets" / "catalogue.yaml"
+FIRST_FRAME_STEP = 7  # between runs of odometry
 
 
 class ConfigError(Exception):
@@ -414,7 +415,7 @@ class Odometry:
     name: str
     title: str
     runs: int  # of each column, unless the command line says otherwise
-    first_frames: int  # that runs begin at in turn
+    first_frames: int  # that runs begin at
     lost_below_pct: float  # frames with a pose
     compared: list[str]
     baselines: list[str]
@@ -440,13 +441,17 @@ class Odometry:
             if sequence.rendered or (data and sequence.path(Path(), data).is_dir())
         ]
 
+    def first_frame(self, run: int) -> int:
+        """Where a run begins: neighbouring runs far apart, all different for as long as that goes."""
+        return FIRST_FRAME_STEP * run % self.first_frames
+
     def flags(self, sequence: str, full: bool, run: int, condition: str, column: str) -> list[str]:
         """Flags of `sgf_align` for a run, counted from 0. @param full the full rendered suite."""
         frames = 0 if full else self.sequences[sequence].short_frames
         change, alignment = self.conditions[condition], self.columns[column]
         values = {f"change.{key}": value for key, value in {**change, "seed": run + 1}.items()}
         values |= {f"alignment.{key}": value for key, value in alignment.items()}
-        values |= {"from": run % self.first_frames} | ({"frames": frames} if frames else {})
+        values |= {"from": self.first_frame(run)} | ({"frames": frames} if frames else {})
         return [
             word
             for key, value in values.items()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,8 @@ def read_runs(study: Odometry, raw: Path, sequences: list[str], runs: int) -> pd
     for sequence in sequences:
         for run in range(runs):
             frame = pd.read_csv(raw / sequence / f"run_{run}" / "scores.csv")
-            frames.append(frame.assign(sequence=sequence, run=run, first_frame=run % study.first_frames))
+            where = {"sequence": sequence, "run": run, "first_frame": study.first_frame(run)}
+            frames.append(frame.assign(**where))
     table = pd.concat(frames, ignore_index=True)
     for name in LENGTHS:
         table[f"{name}_mm"] = 1000 * table.pop(f"{name}_m")
@@ -43,26 +45,33 @@ def read_runs(study: Odometry, raw: Path, sequences: list[str], runs: int) -> pd
     return table[columns].astype({"compared": "Int64"})
 
 
-def _ate(runs: pd.DataFrame, sequence: str, condition: str, column: str) -> np.ndarray:
-    """ATE of all runs in their order, mm."""
-    own = runs["sequence"].eq(sequence) & runs["condition"].eq(condition) & runs["column"].eq(column)
-    return runs[own].sort_values("run")["ate_mm"].to_numpy()
+def errors_by_run(runs: pd.DataFrame) -> pd.DataFrame:
+    """ATE in mm: a line per run, a column per sequence, condition and column."""
+    return runs.pivot(index="run", columns=KEYS, values="ate_mm")
 
 
 def _ratio_fields(ratio: Estimate) -> dict[str, float]:
     return {"ratio": ratio.median, "ratio_low": ratio.low, "ratio_high": ratio.high}
 
 
+def _ratio_to_undisturbed(study: Odometry, errors: pd.DataFrame, key: tuple[str, str, str]) -> Estimate:
+    """Run by run; none of what is undisturbed itself."""
+    sequence, condition, column = key
+    if condition == study.undisturbed:
+        return paired.estimate_median([])
+    unchanged = errors[sequence, study.undisturbed, column]
+    return paired.estimate_median(paired.ratios(errors[key], unchanged))
+
+
 def make_table(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
     """A line per sequence, condition and column: medians over runs, means of shares."""
+    errors = errors_by_run(runs)
     lines = []
-    for (sequence, condition, column), own in runs.groupby(KEYS, sort=False):
-        errors = _ate(runs, sequence, condition, column)
-        ate = paired.estimate_median(errors)
-        unchanged = _ate(runs, sequence, study.undisturbed, column)
-        ratio = paired.estimate_median(paired.ratios(errors, unchanged))
+    for key, own in runs.groupby(KEYS, sort=False):
+        ate = paired.estimate_median(errors[key])
+        ratio = _ratio_to_undisturbed(study, errors, key)
         lines.append({
-            **dict(zip(KEYS, (sequence, condition, column))),
+            **dict(zip(KEYS, key)),
             "runs": len(own),
             "lost": int(own["lost"].sum()),
             "posed_pct": (100 * own["posed"] / own["frames"]).mean(),
@@ -78,17 +87,17 @@ def make_table(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
 
 def compare(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
     """The compared columns against the baselines, run by run."""
+    errors = errors_by_run(runs)
     lines = []
     for sequence, condition in runs[["sequence", "condition"]].drop_duplicates().itertuples(index=False):
-        for column in study.compared:
-            for baseline in study.baselines:
-                both = (_ate(runs, sequence, condition, name) for name in (column, baseline))
-                ratio = paired.estimate_median(paired.ratios(*both))
-                lines.append({
-                    **dict(zip(COMPARED, (sequence, condition, column, baseline, ratio.runs))),
-                    **_ratio_fields(ratio),
-                    "verdict": paired.verdict(ratio, study.verdict_runs, study.margin_pct),
-                })  # fmt: skip
+        for column, baseline in itertools.product(study.compared, study.baselines):
+            both = (errors[sequence, condition, name] for name in (column, baseline))
+            ratio = paired.estimate_median(paired.ratios(*both))
+            lines.append({
+                **dict(zip(COMPARED, (sequence, condition, column, baseline, ratio.runs))),
+                **_ratio_fields(ratio),
+                "verdict": paired.verdict(ratio, study.verdict_runs, study.margin_pct),
+            })  # fmt: skip
     return pd.DataFrame(lines, columns=COMPARED)
 
 
@@ -96,7 +105,7 @@ def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, colour: str,
     """Each run as a dot, their median and its interval; lost runs as a cross at the top."""
     kept = lines[~lines["lost"]]["ate_mm"]
     axis.plot([place] * len(kept), kept, ".", color=colour, markersize=3, alpha=0.6, zorder=2)
-    median = paired.estimate_median(lines["ate_mm"].to_numpy())
+    median = paired.estimate_median(lines["ate_mm"])
     if np.isfinite(median.median):
         axis.plot([place - 0.13, place + 0.13], [median.median] * 2, color=colour, linewidth=2, zorder=3)
         axis.plot([place] * 2, [median.low, min(median.high, top)], color=colour, linewidth=0.8)
@@ -110,7 +119,7 @@ def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, colour: str,
 
 def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
     finite = lines.loc[~lines["lost"], "ate_mm"]
-    top = 1.5 * finite.max()
+    bottom, top = (1, 10) if finite.empty else (0.7 * finite.min(), 1.5 * finite.max())
     shift = 0.8 / len(study.conditions)
     for place, column in enumerate(study.columns):
         for index, condition in enumerate(study.conditions):
@@ -118,7 +127,7 @@ def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
             centre = place + shift * (index - (len(study.conditions) - 1) / 2)
             _draw_column(axis, own, centre, COLOURS[index % len(COLOURS)], top)
     axis.set_yscale("log")
-    axis.set_ylim(0.7 * finite.min(), top)
+    axis.set_ylim(bottom, top)
     axis.yaxis.set_major_formatter(plt.matplotlib.ticker.FormatStrFormatter("%g"))
     axis.yaxis.set_minor_formatter(plt.matplotlib.ticker.NullFormatter())
     axis.set_xticks(range(len(study.columns)), list(study.columns), rotation=25, ha="right")
@@ -131,9 +140,7 @@ def draw(study: Odometry, runs: pd.DataFrame) -> plt.Figure:
     """ATE of all runs by column, a panel per sequence, the conditions beside one another."""
     sequences = list(runs["sequence"].unique())
     rows = -(-len(sequences) // PANEL_COLUMNS)
-    drawing, axes = plt.subplots(
-        rows, PANEL_COLUMNS, figsize=(9, 2.6 * rows + 0.6), squeeze=False, layout="constrained"
-    )
+    drawing, axes = plt.subplots(rows, PANEL_COLUMNS, figsize=(9, 2.6 * rows + 0.9), squeeze=False)
     for axis, sequence in zip(axes.flat, sequences):
         _draw_panel(axis, study, runs[runs["sequence"] == sequence])
         axis.set_title(sequence, pad=14)
@@ -141,9 +148,10 @@ def draw(study: Odometry, runs: pd.DataFrame) -> plt.Figure:
     for axis in axes.flat[len(sequences) :]:
         axis.set_visible(False)
     handles = [plt.Line2D([], [], color=colour, linewidth=2) for colour in COLOURS]
-    drawing.legend(handles, list(study.conditions), loc="outside lower center", ncol=4, frameon=False)
+    drawing.legend(handles, list(study.conditions), loc="lower center", ncol=4, frameon=False)
     count = runs["run"].nunique()
     drawing.suptitle(f"{study.title}\n{count} runs each; bars: medians; crosses: how many runs were lost")
+    drawing.tight_layout(rect=(0, 0.25 / drawing.get_figheight(), 1, 1))
     return drawing
 
 

@@ -7,6 +7,7 @@ a verdict.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,8 +27,9 @@ class Estimate:
     runs: int
 
 
-def estimate_median(values: np.ndarray) -> Estimate:
+def estimate_median(of_runs: Sequence[float]) -> Estimate:
     """The median of the values that are numbers; infinite ones count."""
+    values = np.asarray(of_runs, dtype=float)
     values = values[~np.isnan(values)]
     if values.size == 0:
         return Estimate(NAN, NAN, NAN, 0)
@@ -37,10 +39,10 @@ def estimate_median(values: np.ndarray) -> Estimate:
     return Estimate(float(np.median(values)), float(low), float(high), values.size)
 
 
-def ratios(errors: np.ndarray, of_others: np.ndarray) -> np.ndarray:
-    """Errors over those of the other runs, NaN where both are lost."""
+def ratios(errors: Sequence[float], of_others: Sequence[float]) -> np.ndarray:
+    """Errors over those of the other runs, in the same order; NaN where both are lost."""
     with np.errstate(invalid="ignore"):
-        return errors / of_others
+        return np.divide(errors, of_others)
 
 
 def verdict(ratio: Estimate, least_runs: int, margin_pct: float) -> str:
