@@ -400,7 +400,7 @@ class TrackedSequence:
     folder: str  # below that of the rendered suite, or of downloaded data
     contents: str
     rendered: bool = False
-    short_frames: int = 0  # that a run on the short suite takes; 0 for all
+    frames: int = 0  # of a run; 0 for all
 
     def path(self, suite: Path, data: str) -> Path:
         """Its folder. @param suite folder of the rendered suite."""
@@ -447,7 +447,8 @@ class Odometry:
 
     def flags(self, sequence: str, full: bool, run: int, condition: str, column: str) -> list[str]:
         """Flags of `sgf_align` for a run, counted from 0. @param full the full rendered suite."""
-        frames = 0 if full else self.sequences[sequence].short_frames
+        tracked = self.sequences[sequence]
+        frames = 0 if full and tracked.rendered else tracked.frames
         change, alignment = self.conditions[condition], self.columns[column]
         values = {f"change.{key}": value for key, value in {**change, "seed": run + 1}.items()}
         values |= {f"alignment.{key}": value for key, value in alignment.items()}

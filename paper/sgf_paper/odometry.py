@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from sgf_paper import config, paired, style, text
 from sgf_paper.config import Odometry
@@ -128,8 +129,9 @@ def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
             _draw_column(axis, own, centre, COLOURS[index % len(COLOURS)], top)
     axis.set_yscale("log")
     axis.set_ylim(bottom, top)
-    axis.yaxis.set_major_formatter(plt.matplotlib.ticker.FormatStrFormatter("%g"))
-    axis.yaxis.set_minor_formatter(plt.matplotlib.ticker.NullFormatter())
+    axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
     axis.set_xticks(range(len(study.columns)), list(study.columns), rotation=25, ha="right")
     axis.tick_params(axis="x", length=0)
     axis.grid(axis="y", which="both", alpha=0.3, linewidth=0.5)
