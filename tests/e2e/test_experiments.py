@@ -328,3 +328,12 @@ def test_downloaded_sequences_are_tracked_from_where_they_lie(project):
     table = rows(project.results / "tables" / "odometry.csv")
     assert [row["sequence"] for row in table] == ["V1_03_difficult"] * 4 + ["euroc_MH_01"] * 4
     assert len(project.trackings()) == 8
+
+
+def test_a_changed_condition_makes_its_runs_anew(project):
+    assert project.run("--only", "odometry")[0] == 0
+    study = project.root / "paper" / "experiments" / "odometry.yaml"
+    study.write_text(study.read_text().replace("vignette: 0.5", "vignette: 0.6"))
+    code, output = project.run("--only", "odometry")
+    assert code == 0 and "odometry       made" in output, output
+    assert len(project.trackings()) == 4 + 2
