@@ -212,6 +212,7 @@ def make_odometry(
         study=study,
         runs=runs,
         sequences={sequence: study.sequences[sequence] for sequence in sequences},
+        absent=[sequence for sequence in study.sequences if sequence not in sequences],
         blocks=make_blocks(table),
         compared=_compared_rows(compared),
     )
