@@ -102,13 +102,15 @@ def compare(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=COMPARED)
 
 
-def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, colour: str, top: float) -> None:
+def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, width: float, colour: str) -> None:
     """Each run as a dot, their median and its interval; lost runs as a cross at the top."""
+    top = axis.get_ylim()[1]
     kept = lines[~lines["lost"]]["ate_mm"]
     axis.plot([place] * len(kept), kept, ".", color=colour, markersize=3, alpha=0.6, zorder=2)
     median = paired.estimate_median(lines["ate_mm"])
     if np.isfinite(median.median):
-        axis.plot([place - 0.13, place + 0.13], [median.median] * 2, color=colour, linewidth=2, zorder=3)
+        ends = [place - width / 2, place + width / 2]
+        axis.plot(ends, [median.median] * 2, color=colour, linewidth=2, zorder=3)
         axis.plot([place] * 2, [median.low, min(median.high, top)], color=colour, linewidth=0.8)
     if lines["lost"].any():
         axis.plot(place, top, "x", color=colour, markersize=5, clip_on=False, zorder=4)
@@ -121,14 +123,14 @@ def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, colour: str,
 def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
     finite = lines.loc[~lines["lost"], "ate_mm"]
     bottom, top = (1, 10) if finite.empty else (0.7 * finite.min(), 1.5 * finite.max())
+    axis.set_yscale("log")
+    axis.set_ylim(bottom, top)
     shift = 0.8 / len(study.conditions)
     for place, column in enumerate(study.columns):
         for index, condition in enumerate(study.conditions):
             own = lines[(lines["column"] == column) & (lines["condition"] == condition)]
             centre = place + shift * (index - (len(study.conditions) - 1) / 2)
-            _draw_column(axis, own, centre, COLOURS[index % len(COLOURS)], top)
-    axis.set_yscale("log")
-    axis.set_ylim(bottom, top)
+            _draw_column(axis, own, centre, 0.7 * shift, COLOURS[index % len(COLOURS)])
     axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
     axis.yaxis.set_minor_formatter(NullFormatter())
@@ -141,8 +143,9 @@ def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
 def draw(study: Odometry, runs: pd.DataFrame) -> plt.Figure:
     """ATE of all runs by column, a panel per sequence, the conditions beside one another."""
     sequences = list(runs["sequence"].unique())
-    rows = -(-len(sequences) // PANEL_COLUMNS)
-    drawing, axes = plt.subplots(rows, PANEL_COLUMNS, figsize=(9, 2.6 * rows + 0.9), squeeze=False)
+    columns = min(PANEL_COLUMNS, len(sequences))
+    rows = -(-len(sequences) // columns)
+    drawing, axes = plt.subplots(rows, columns, figsize=(9, 2.6 * rows + 0.9), squeeze=False)
     for axis, sequence in zip(axes.flat, sequences):
         _draw_panel(axis, study, runs[runs["sequence"] == sequence])
         axis.set_title(sequence, pad=14)

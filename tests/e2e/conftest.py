@@ -40,9 +40,10 @@ def drop_extra_columns(file):
 
 
 def shorten_odometry(file):
-    """Keeps one sequence of the rendered ones, two columns, and one run."""
+    """Keeps the first of the rendered sequences, two columns, and one run."""
     study = yaml.safe_load(file.read_text())
-    del study["sequences"]["MH_03_medium"]
+    for name in [name for name, sequence in study["sequences"].items() if "rendered" in sequence][1:]:
+        del study["sequences"][name]
     study |= {"runs": 1, "compared": ["sgf"], "baselines": ["photo"]}
     study["columns"] = {name: study["columns"][name] for name in ("sgf", "photo")}
     file.write_text(yaml.safe_dump(study, sort_keys=False))
@@ -69,7 +70,8 @@ class Project:
             shutil.copy2(PROJECT / file, self.root / file)
         for sweep in (self.root / "paper" / "sweeps").iterdir():
             drop_extra_columns(sweep)
-        shorten_odometry(self.root / "paper" / "experiments" / "odometry.yaml")
+        for study in (self.root / "paper" / "experiments").glob("odometry*.yaml"):
+            shorten_odometry(study)
         light_change = self.root / "paper" / "experiments" / "light_change.yaml"
         light_change.write_text(light_change.read_text().replace(", census]", "]"))
 

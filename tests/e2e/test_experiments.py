@@ -12,7 +12,8 @@ SWEEPS = [yaml.safe_load(path.read_text()) for path in (PROJECT / "paper" / "swe
 COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_columns(sweep)]
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
-RENDERED = ["convergence", "fig1", "fig2", "fig3", "odometry", "scenes", "sequences"]  # these need no data set
+ODOMETRY = ["odometry", "odometry_parts"]
+RENDERED = ["convergence", "fig1", "fig2", "fig3", *ODOMETRY, "scenes", "sequences"]  # these need no data set
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -24,7 +25,7 @@ FILES = {
     + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
     + ["convergence.csv", "convergence.md"]
-    + ["odometry.csv", "odometry_compared.csv", "odometry_runs.csv", "odometry.md"]
+    + [f"{name}{end}" for name in ODOMETRY for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
@@ -256,7 +257,7 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
     "command, log, lost",
     [
         ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
-        ("sequence", "sequences_run.log", ["odometry", "sequences"]),
+        ("sequence", "sequences_run.log", [*ODOMETRY, "sequences"]),
     ],
 )
 def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):

@@ -211,7 +211,15 @@ def test_the_figure_has_a_dot_for_each_run_that_is_not_lost_and_counts_the_other
     assert [label.get_text() for label in axis.texts] == ["1/3", "1/3", "3/3"]
     crosses = [line for line in axis.lines if line.get_marker() == "x"]
     assert len(crosses) == 3
-    assert not drawing.axes[1].get_visible()
+    assert len(drawing.axes) == 1
+    pyplot.close(drawing)
+
+
+def test_the_figure_has_a_panel_for_each_sequence(study, lines):
+    names = ["one", "two", "three"]
+    drawing = odometry.draw(study, pd.concat([lines.assign(sequence=name) for name in names]))
+    visible = [axis for axis in drawing.axes if axis.get_visible()]
+    assert [axis.get_title() for axis in visible] == names
     pyplot.close(drawing)
 
 
