@@ -155,7 +155,7 @@ def draw(study: Odometry, runs: pd.DataFrame) -> plt.Figure:
     handles = [plt.Line2D([], [], color=colour, linewidth=2) for colour in COLOURS]
     drawing.legend(handles, list(study.conditions), loc="lower center", ncol=4, frameon=False)
     count = runs["run"].nunique()
-    drawing.suptitle(f"{study.title}\n{count} runs each; bars: medians; crosses: how many runs were lost")
+    drawing.suptitle(f"{study.title}\nruns of each: {count}; bars: medians; crosses: how many were lost")
     drawing.tight_layout(rect=(0, 0.25 / drawing.get_figheight(), 1, 1))
     return drawing
 
