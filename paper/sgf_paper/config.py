@@ -392,6 +392,40 @@ class Convergence:
         raise ConfigError(f"{self.name}: no image set is at hand")
 
 
+@dataclass(frozen=True)
+class TrackedSequence:
+    """A sequence that cameras are tracked in: rendered, or downloaded."""
+
+    folder: str  # below that of the rendered suite, or of downloaded data
+    contents: str
+    rendered: bool = False
+
+    def path(self, suite: Path, data: str) -> Path:
+        """Its folder. @param suite folder of the rendered suite."""
+        return (suite if self.rendered else Path(data)) / self.folder
+
+
+@dataclass
+class MrptMap:
+    """Sequences that go through the MRPT module's programs."""
+
+    kind: str
+    name: str
+    title: str
+    sequences: dict[str, TrackedSequence]
+
+    def present(self, data: str) -> list[str]:
+        """Names of the sequences at hand: rendered ones always are.
+
+        @param data folder with downloaded data, may be empty.
+        """
+        return [
+            name
+            for name, sequence in self.sequences.items()
+            if sequence.rendered or (data and sequence.path(Path(), data).is_dir())
+        ]
+
+
 @dataclass
 class ShiftProfile:
     """What `sgf_study shift-profile` runs."""
@@ -430,8 +464,8 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, SemiDense,
-    SelfMatch, ShiftProfile,
+    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
+    SemiDense, SelfMatch, ShiftProfile,
 ]
 
 
@@ -562,6 +596,15 @@ def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
     return study
 
 
+def _build_mrpt_map(node: dict[str, Any], where: str) -> MrptMap:
+    experiment = _build(MrptMap, node, where)
+    experiment.sequences = {
+        name: _build(TrackedSequence, sequence, f"{where}: sequences.{name}")
+        for name, sequence in experiment.sequences.items()
+    }
+    return experiment
+
+
 BUILDERS = {
     "benchmark": partial(_build, Benchmark),
     "contact_sheet": partial(_build, ContactSheet),
@@ -569,6 +612,7 @@ BUILDERS = {
     "density": partial(_build, Density),
     "disparity_figure": _build_figure,
     "light_change": _build_light_change,
+    "mrpt_map": _build_mrpt_map,
     "self_match": _build_self_match,
     "semi_dense": _build_semi_dense,
     "sequences": partial(_build, Sequences),

@@ -118,6 +118,7 @@ void writeMaps(const CSgfOdometry& odometry, const std::string& prefix)
 		odometry.map().saveToFile(prefix + ".simplemap"),
 		prefix + ".simplemap");
 	writeScene(odometry, points, prefix + ".3Dscene");
+	require(points.saveToPlyFile(prefix + ".ply", true), prefix + ".ply");
 	require(topView(points, path).saveToFile(prefix + ".png"), prefix + ".png");
 	saveTrajectoryTUM(odometry.trajectory(), prefix + ".tum");
 }
@@ -163,8 +164,8 @@ int main(int argc, char** argv)
 {
 	CLI::App app(
 		"Visual odometry on a rawlog or a data set. Writes PREFIX_obs.rawlog, "
-		"PREFIX_actsf.rawlog, PREFIX.simplemap, PREFIX.3Dscene, PREFIX.png and "
-		"PREFIX.tum",
+		"PREFIX_actsf.rawlog, PREFIX.simplemap, PREFIX.3Dscene, PREFIX.ply, "
+		"PREFIX.png and PREFIX.tum",
 		"sgf-odometry-cli");
 	mrpt::sgf::apps::TArguments a;
 	app.add_option("-i,--input", a.input, "rawlog, or folder of a data set")

@@ -93,7 +93,7 @@ def test_every_frame_has_a_pose_and_every_file_is_there(drive):
     assert len(drive.poses) == drive.frames
     assert f"frames: {drive.frames}, with pose: {drive.frames}, lost: 0" in drive.report
     assert "skipped" not in drive.report
-    for ending in ("_obs.rawlog", "_actsf.rawlog", ".simplemap", ".3Dscene", ".png", ".tum"):
+    for ending in ("_obs.rawlog", "_actsf.rawlog", ".simplemap", ".3Dscene", ".ply", ".png", ".tum"):
         assert drive.file(ending).stat().st_size > 0
     assert max(Image.open(drive.file(".png")).size) == 1001
     assert not list(drive.folder.glob("*.part"))
