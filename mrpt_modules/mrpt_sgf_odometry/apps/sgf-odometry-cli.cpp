@@ -128,6 +128,12 @@ struct TArguments
 	std::string input, prefix, config, section = "SgfOdometry";
 };
 
+std::string ofSensor(const CSgfOdometry::TParams& params)
+{
+	if (params.sensor_label.empty()) return "";
+	return " of sensor " + params.sensor_label;
+}
+
 void run(const TArguments& arguments)
 {
 	CSgfOdometry odometry;
@@ -145,10 +151,11 @@ void run(const TArguments& arguments)
 			logs.take(*result);
 		}
 	std::cout << odometry.report();
+	reportIncomplete(*source);
 	if (frames == 0)
 		THROW_EXCEPTION_FMT(
-			"%s: has no stereo images and no range scans",
-			arguments.input.c_str());
+			"%s: has no stereo images and no range scans%s",
+			arguments.input.c_str(), ofSensor(odometry.params).c_str());
 	if (odometry.trajectory().empty())
 		THROW_EXCEPTION_FMT(
 			"%s: no frame could be used", arguments.input.c_str());
