@@ -26,6 +26,8 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --sanitize      test: only the C++ unit tests, under the address and undefined-behaviour sanitizers
   --full          render the full suite of eleven sequences (15 GB at most) instead of the short one
                   of four (2 GB at most)
+  --runs N        runs of each line of the tables that repeat runs (odometry); default: a few, for a
+                  quick look; rankings take 10
   --jobs N        parallel jobs; default: the number of processors
   --list          list the experiments and stop
   --clean         remove what was built and generated (not results/reference) and stop
@@ -197,9 +199,10 @@ run_experiments() {
   mapfile -t mrpt < <(mrpt_programs)
   ((${#mrpt[@]})) ||
     printf '  the MRPT module and what it shows are left out; why: %s\n' "$logs/configure.log"
-  build release sgf_eval sgf_render sgf_stereo sgf_study stereo_bench "${mrpt[@]}"
+  build release sgf_align sgf_eval sgf_render sgf_stereo sgf_study stereo_bench "${mrpt[@]}"
   cd paper
-  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${stages[@]}"
+  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${runs[@]}" \
+    "${stages[@]}"
 }
 
 run_tests() {
@@ -213,12 +216,18 @@ run_tests() {
   exec ctest --preset "$preset" --parallel "$jobs"
 }
 
+# require_number OPTION [VALUE]...: the value of an option that takes a positive number.
+require_number() {
+  [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || wrong_usage "$1 needs a positive number, not '${2:-}'"
+}
+
 # --- command line --------------------------------------------------------------------------------
 
 mode=run
 stages=()
 preset=release
 full=()
+runs=()
 data=${SGF_DATA:-}
 jobs=$(nproc)
 
@@ -240,8 +249,13 @@ while (($#)); do
       ;;
     --sanitize) preset=sanitize ;;
     --full) full=(--full) ;;
+    --runs)
+      require_number "$@"
+      runs=(--runs "$2")
+      shift
+      ;;
     --jobs)
-      [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || wrong_usage "--jobs needs a positive number, not '${2:-}'"
+      require_number "$@"
       jobs=$2
       shift
       ;;

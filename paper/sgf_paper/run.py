@@ -38,6 +38,7 @@ class Settings:
     generated: Path
     jobs: int
     full: bool  # the full suites of rendered sequences
+    runs: int  # of experiments that repeat runs; 0 for as many as they say
 
     @property
     def logs(self) -> Path:
@@ -90,7 +91,7 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
     if stage.kind == "disparity_figure":
         return stage.group(datasets) is not None
     if stage.kind in (
-        "contact_sheet", "convergence", "mrpt_map", "self_match", "semi_dense", "sequences",
+        "contact_sheet", "convergence", "mrpt_map", "odometry", "self_match", "semi_dense", "sequences",
         "shift_profile",
     ):  # fmt: skip
         return True  # rendered
@@ -111,6 +112,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
         "data": settings.data,
         "generated": settings.generated,
         "full": int(settings.full),
+        "runs": settings.runs,
     }
     return [
         PYTHON, "-m", "snakemake",
@@ -202,6 +204,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
     parser.add_argument("--full", action="store_true", help="full suites of sequences, not short ones")
+    parser.add_argument("--runs", type=int, default=0, help="of experiments that repeat runs")
     parser.add_argument("stages", nargs="+", help="names of experiments")
     return parser.parse_args()
 
@@ -220,6 +223,7 @@ def main() -> int:
         generated=arguments.generated.resolve(),
         jobs=arguments.jobs,
         full=arguments.full,
+        runs=arguments.runs,
     )
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]

@@ -18,6 +18,7 @@ FILES = {
     "contact_sheet": "figures/{}.png (.pdf)",
     "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "mrpt_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "odometry": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _compared.csv, _runs.csv)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
@@ -32,6 +33,7 @@ MAIN_FILE = {
     "contact_sheet": "figures/{}.png",
     "convergence": "tables/{}.csv",
     "mrpt_map": "tables/{}.csv",
+    "odometry": "tables/{}.csv",
     "sequences": "tables/{}.csv",
     "semi_dense": "tables/{}.csv",
     "self_match": "tables/{}.csv",
@@ -138,6 +140,20 @@ def _light_change_lines(path: Path) -> list[str]:
     return lines
 
 
+def _odometry_lines(path: Path) -> list[str]:
+    """Per sequence and condition the columns by their ATE, and how many runs were lost."""
+    frame = pd.read_csv(path)
+    lines = []
+    for (sequence, condition), rows in frame.groupby(["sequence", "condition"], sort=False):
+        order = rows.sort_values("ate_mm", kind="stable")
+        texts = [
+            f"{row.column} {row.ate_mm:.1f}" + (f" ({row.lost}/{row.runs} lost)" if row.lost else "")
+            for row in order.itertuples()
+        ]
+        lines.append(f"{sequence}, {condition}, median ATE mm: {', '.join(texts)}")
+    return lines
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
@@ -151,6 +167,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _convergence_lines(main_file(stage, results), stage.table_start["px"])
     if stage.kind == "mrpt_map":
         return _mrpt_map_lines(main_file(stage, results))
+    if stage.kind == "odometry":
+        return _odometry_lines(main_file(stage, results))
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
     return []

@@ -7,7 +7,7 @@ import pytest
 from conftest import PROJECT
 
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
-PROGRAMS = "sgf_eval sgf_render sgf_stereo sgf_study stereo_bench"
+PROGRAMS = "sgf_align sgf_eval sgf_render sgf_stereo sgf_study stereo_bench"
 MRPT_PROGRAMS = "dataset2rawlog sgf-odometry-cli"
 APT_LINE = "sudo apt-get update && sudo apt-get install -y --no-install-recommends "
 
@@ -55,6 +55,8 @@ def test_help_and_list_need_nothing_built(project):
         (["--jobs", "0"], "--jobs needs a positive number, not '0'"),
         (["--jobs", "two"], "--jobs needs a positive number, not 'two'"),
         (["--jobs"], "--jobs needs"),
+        (["--runs", "0"], "--runs needs a positive number, not '0'"),
+        (["--runs"], "--runs needs"),
         (["--data"], "--data needs a folder"),
         (["--data", "/nonexistent/data"], "data folder '/nonexistent/data' does not exist"),
         (["test", "--only", "table1"], "does not go with test"),

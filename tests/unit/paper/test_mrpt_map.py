@@ -122,9 +122,9 @@ def test_a_downloaded_sequence_is_at_hand_where_its_folder_is(tmp_path):
 
 
 def test_an_unknown_key_of_a_sequence_is_named(experiments):
-    node = {**NODE, "sequences": {"a": {"folder": "a", "contents": "b", "frames": 3}}}
+    node = {**NODE, "sequences": {"a": {"folder": "a", "contents": "b", "colour": 3}}}
     (experiments / "bad.yaml").write_text(yaml.safe_dump(node))
-    with pytest.raises(ConfigError, match="sequences.a: unknown key 'frames'"):
+    with pytest.raises(ConfigError, match="sequences.a: unknown key 'colour'"):
         config.load_experiment("bad")
 
 
