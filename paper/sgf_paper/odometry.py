@@ -181,7 +181,7 @@ def _row(line: object) -> dict[str, str]:
         "ate": _estimate(line.ate_mm, line.ate_low_mm, line.ate_high_mm, 1),
         "ratio": _estimate(line.ratio, line.ratio_low, line.ratio_high, 2),
         "rpe": _number(line.rpe_one_second_mm, 1),
-        "orientation": _number(line.orientation_deg, 2),
+        "rpe_deg": _number(line.rpe_one_second_deg, 2),
     }
 
 

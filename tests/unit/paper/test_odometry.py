@@ -142,7 +142,7 @@ def raw(study, tmp_path):
                 line = {"condition": condition, "column": column, "frames": 60, "posed": 30 if lost else 60}
                 line |= {"lost": lost, "clipped_pct": run}
                 scores = dict.fromkeys(odometry_scores.ERRORS.values(), error / 1000)
-                scores |= {"orientation_deg": 1.5, "compared": 60}
+                scores |= {"rpe_one_second_deg": 1.5, "compared": 60}
                 lines.append(line | ({} if lost else scores))
         folder = tmp_path / "raw" / "MH_03_medium" / f"run_{run}"
         folder.mkdir(parents=True)
