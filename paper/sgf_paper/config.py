@@ -20,6 +20,7 @@ SWEEPS = PAPER / "sweeps"
 PUBLISHED = PAPER / "published.yaml"
 RECIPES = PROJECT / "datasets" / "synthetic"
 CATALOGUE = PROJECT / "datasets" / "catalogue.yaml"
+FIRST_FRAME_STEP = 7  # between runs of odometry
 
 
 class ConfigError(Exception):
@@ -392,6 +393,87 @@ class Convergence:
         raise ConfigError(f"{self.name}: no image set is at hand")
 
 
+@dataclass(frozen=True)
+class TrackedSequence:
+    """A sequence that cameras are tracked in: rendered, or downloaded."""
+
+    folder: str  # below that of the rendered suite, or of downloaded data
+    contents: str
+    rendered: bool = False
+    frames: int = 0  # of a run; 0 for all
+
+    def path(self, suite: Path, data: str) -> Path:
+        """Its folder. @param suite folder of the rendered suite."""
+        return (suite if self.rendered else Path(data)) / self.folder
+
+    def frames_taken(self, full: bool) -> int:
+        """Frames of a run, 0 for all. @param full the full rendered suite, of which runs take all."""
+        return 0 if full and self.rendered else self.frames
+
+
+@dataclass
+class SequenceExperiment:
+    """What is run on sequences."""
+
+    kind: str
+    name: str
+    title: str
+    sequences: dict[str, TrackedSequence]
+
+    def present(self, data: str) -> list[str]:
+        """Names of the sequences at hand: rendered ones always are.
+
+        @param data folder with downloaded data, may be empty.
+        """
+        return [
+            name
+            for name, sequence in self.sequences.items()
+            if sequence.rendered or (data and sequence.path(Path(), data).is_dir())
+        ]
+
+
+@dataclass
+class MrptMap(SequenceExperiment):
+    """Sequences that go through the MRPT module's programs."""
+
+
+@dataclass
+class Odometry(SequenceExperiment):
+    """What `sgf_align` runs on which sequences, and what is compared."""
+
+    runs: int  # of each column, unless the command line says otherwise
+    first_frames: int  # that runs begin at
+    lost_below_pct: float  # frames with a pose
+    compared: list[str]
+    baselines: list[str]
+    verdict_runs: int  # fewer give no verdict
+    margin_pct: float
+    conditions: dict[str, dict[str, Any]]
+    columns: dict[str, dict[str, Any]]
+
+    @property
+    def undisturbed(self) -> str:
+        """The condition that the others are compared with: the first."""
+        return next(iter(self.conditions))
+
+    def first_frame(self, run: int) -> int:
+        """Where a run begins: neighbouring runs far apart, all different for as long as that goes."""
+        return FIRST_FRAME_STEP * run % self.first_frames
+
+    def flags(self, sequence: str, full: bool, run: int, condition: str, column: str) -> list[str]:
+        """Flags of `sgf_align` for a run, counted from 0. @param full the full rendered suite."""
+        frames = self.sequences[sequence].frames_taken(full)
+        change, alignment = self.conditions[condition], self.columns[column]
+        values = {f"change.{key}": value for key, value in {**change, "seed": run + 1}.items()}
+        values |= {f"alignment.{key}": value for key, value in alignment.items()}
+        values |= {"from": self.first_frame(run)} | ({"frames": frames} if frames else {})
+        return [
+            word
+            for key, value in values.items()
+            for word in (f"--{key.replace('_', '-')}", str(value).lower())
+        ]
+
+
 @dataclass
 class ShiftProfile:
     """What `sgf_study shift-profile` runs."""
@@ -430,8 +512,8 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, SemiDense,
-    SelfMatch, ShiftProfile,
+    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
+    Odometry, SemiDense, SelfMatch, ShiftProfile,
 ]
 
 
@@ -562,6 +644,29 @@ def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
     return study
 
 
+def _build_on_sequences(cls: type, node: dict[str, Any], where: str) -> Any:
+    """Makes dataclass `cls`, a SequenceExperiment, of a YAML map."""
+    experiment = _build(cls, node, where)
+    experiment.sequences = {
+        name: _build(TrackedSequence, sequence, f"{where}: sequences.{name}")
+        for name, sequence in experiment.sequences.items()
+    }
+    return experiment
+
+
+def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
+    study = _build_on_sequences(Odometry, node, where)
+    for key in ("compared", "baselines"):
+        if unknown := set(getattr(study, key)) - set(study.columns):
+            raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
+    for key in ("runs", "first_frames"):
+        if getattr(study, key) < 1:
+            raise ConfigError(f"{where}: {key} is {getattr(study, key)}; it has to be positive")
+    if study.conditions[study.undisturbed]:
+        raise ConfigError(f"{where}: conditions: the first one must change nothing")
+    return study
+
+
 BUILDERS = {
     "benchmark": partial(_build, Benchmark),
     "contact_sheet": partial(_build, ContactSheet),
@@ -569,6 +674,8 @@ BUILDERS = {
     "density": partial(_build, Density),
     "disparity_figure": _build_figure,
     "light_change": _build_light_change,
+    "mrpt_map": partial(_build_on_sequences, MrptMap),
+    "odometry": _build_odometry,
     "self_match": _build_self_match,
     "semi_dense": _build_semi_dense,
     "sequences": partial(_build, Sequences),

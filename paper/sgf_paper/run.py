@@ -38,6 +38,7 @@ class Settings:
     generated: Path
     jobs: int
     full: bool  # the full suites of rendered sequences
+    runs: int  # of experiments that repeat runs; 0 for as many as they say
 
     @property
     def logs(self) -> Path:
@@ -90,10 +91,18 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
     if stage.kind == "disparity_figure":
         return stage.group(datasets) is not None
     if stage.kind in (
-        "contact_sheet", "convergence", "self_match", "semi_dense", "sequences", "shift_profile",
+        "contact_sheet", "convergence", "mrpt_map", "odometry", "self_match", "semi_dense", "sequences",
+        "shift_profile",
     ):  # fmt: skip
         return True  # rendered
     return stage.pair(datasets) is not None
+
+
+def obstacle(stage: Experiment, datasets: dict[str, Dataset], programs: Path) -> str:
+    """Why a stage cannot be made; empty if it can be."""
+    if stage.kind == "mrpt_map" and not (programs / "sgf-odometry-cli").exists():
+        return "the MRPT module is not part of the build"
+    return "" if has_data(stage, datasets) else "its data are not at hand"
 
 
 def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str]:
@@ -103,6 +112,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
         "data": settings.data,
         "generated": settings.generated,
         "full": int(settings.full),
+        "runs": settings.runs,
     }
     return [
         PYTHON, "-m", "snakemake",
@@ -154,29 +164,34 @@ def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
     datasets = find_datasets(settings)
     for dataset in datasets.values():
         print(f"  {dataset.name}: {dataset.scenes} scenes in {dataset.folder}", flush=True)
-    runnable = [stage for stage in stages if has_data(stage, datasets)]
+    obstacles = {stage.name: obstacle(stage, datasets, settings.bin) for stage in stages}
+    runnable = [stage for stage in stages if not obstacles[stage.name]]
     if not runnable:
-        raise RunError("no data set at hand for any stage; see the lines above, or give --data")
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in obstacles.items())
+        raise RunError(f"nothing can be made ({reasons}); see the lines above, or give --data")
     print(f"== experiments: {' '.join(stage.name for stage in runnable)}", flush=True)
     passed = run_snakemake(settings, runnable, lock_file)
-    print_summary(settings, stages, runnable, datasets, started)
+    print_summary(settings, stages, obstacles, datasets, started)
     return passed
 
 
 def print_summary(
     settings: Settings,
     stages: list[Experiment],
-    runnable: list[Experiment],
+    obstacles: dict[str, str],
     datasets: dict[str, Dataset],
     started: float,
 ) -> None:
-    """Ends a run: what was made, where it lies, what was measured, what was absent."""
+    """Ends a run: what was made, where it lies, what was measured, what was absent.
+
+    @param obstacles why stages were left out, by name; empty for the others.
+    """
     print(f"== summary ({clock(time.time() - started)}; all files in {settings.results})")
     for stage in stages:
-        if stage in runnable:
-            print("\n".join(summary.stage_lines(stage, settings.results, started)))
+        if obstacles[stage.name]:
+            print(f"  {stage.name:14} left out: {obstacles[stage.name]}")
         else:
-            print(f"  {stage.name:14} left out: its data are not at hand")
+            print("\n".join(summary.stage_lines(stage, settings.results, started)))
     absent = summary.absent_datasets(stages, datasets)
     print("  Data sets absent: " + ("; ".join(absent) if absent else "none"), flush=True)
 
@@ -189,6 +204,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
     parser.add_argument("--full", action="store_true", help="full suites of sequences, not short ones")
+    parser.add_argument("--runs", type=int, default=0, help="of experiments that repeat runs")
     parser.add_argument("stages", nargs="+", help="names of experiments")
     return parser.parse_args()
 
@@ -207,6 +223,7 @@ def main() -> int:
         generated=arguments.generated.resolve(),
         jobs=arguments.jobs,
         full=arguments.full,
+        runs=arguments.runs,
     )
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]

@@ -17,6 +17,8 @@ FILES = {
     "benchmark": "tables/{}.md (.csv)",
     "contact_sheet": "figures/{}.png (.pdf)",
     "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "mrpt_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "odometry": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _compared.csv, _runs.csv)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
@@ -30,6 +32,8 @@ MAIN_FILE = {
     "benchmark": "tables/{}.csv",
     "contact_sheet": "figures/{}.png",
     "convergence": "tables/{}.csv",
+    "mrpt_map": "tables/{}.csv",
+    "odometry": "tables/{}.csv",
     "sequences": "tables/{}.csv",
     "semi_dense": "tables/{}.csv",
     "self_match": "tables/{}.csv",
@@ -114,6 +118,15 @@ def _convergence_lines(path: Path, start_px: float) -> list[str]:
     return lines
 
 
+def _mrpt_map_lines(path: Path) -> list[str]:
+    """Per sequence the counts and the error."""
+    return [
+        f"{row.sequence}: {row.posed} of {row.frames} frames with pose, {row.keyframes} key-frames,"
+        f" {row.points} points, ATE RMSE {1000 * row.ate_rmse_m:.1f} mm"
+        for row in pd.read_csv(path).itertuples()
+    ]
+
+
 def _light_change_lines(path: Path) -> list[str]:
     """Per data set, region, case and matcher the columns by the rise of their mean error."""
     frame = pd.read_csv(path, dtype={"case": str}).dropna(subset="mean_px_rise")
@@ -124,6 +137,20 @@ def _light_change_lines(path: Path) -> list[str]:
         texts = [f"{row.cost} {row.mean_px_rise:+.2f}" for row in order.itertuples()]
         where = f"{dataset} {region}, {case}, {text.matcher_title(matcher)}"
         lines.append(f"{where}, rise of mean px: {', '.join(texts)}")
+    return lines
+
+
+def _odometry_lines(path: Path) -> list[str]:
+    """Per sequence and condition the columns by their ATE, and how many runs were lost."""
+    frame = pd.read_csv(path)
+    lines = []
+    for (sequence, condition), rows in frame.groupby(["sequence", "condition"], sort=False):
+        order = rows.sort_values("ate_mm", kind="stable")
+        texts = [
+            f"{row.column} {row.ate_mm:.1f}" + (f" ({row.lost}/{row.runs} lost)" if row.lost else "")
+            for row in order.itertuples()
+        ]
+        lines.append(f"{sequence}, {condition}, median ATE mm: {', '.join(texts)}")
     return lines
 
 
@@ -138,6 +165,10 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _semi_dense_lines(main_file(stage, results), stage.drawn)
     if stage.kind == "convergence":
         return _convergence_lines(main_file(stage, results), stage.table_start["px"])
+    if stage.kind == "mrpt_map":
+        return _mrpt_map_lines(main_file(stage, results))
+    if stage.kind == "odometry":
+        return _odometry_lines(main_file(stage, results))
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
     return []

@@ -39,6 +39,16 @@ def drop_extra_columns(file):
     file.write_text(yaml.safe_dump(sweep, default_flow_style=None, sort_keys=False))
 
 
+def shorten_odometry(file):
+    """Keeps the first of the rendered sequences, two columns, and one run."""
+    study = yaml.safe_load(file.read_text())
+    for name in [name for name, sequence in study["sequences"].items() if "rendered" in sequence][1:]:
+        del study["sequences"][name]
+    study |= {"runs": 1, "compared": ["sgf"], "baselines": ["photo"]}
+    study["columns"] = {name: study["columns"][name] for name in ("sgf", "photo")}
+    file.write_text(yaml.safe_dump(study, sort_keys=False))
+
+
 class Project:
     """One copy of the project and ways to run its reproduce.sh."""
 
@@ -60,6 +70,8 @@ class Project:
             shutil.copy2(PROJECT / file, self.root / file)
         for sweep in (self.root / "paper" / "sweeps").iterdir():
             drop_extra_columns(sweep)
+        for study in (self.root / "paper" / "experiments").glob("odometry*.yaml"):
+            shorten_odometry(study)
         light_change = self.root / "paper" / "experiments" / "light_change.yaml"
         light_change.write_text(light_change.read_text().replace(", census]", "]"))
 
@@ -101,6 +113,11 @@ class Project:
     def renderings(self):
         """Commands of the stand-in for sgf_render, and the pairs and sequences it has made."""
         file = self.bin / "renderings"
+        return file.read_text().splitlines() if file.exists() else []
+
+    def trackings(self):
+        """`sequence residual seed` for each run of the stand-in for sgf_align."""
+        file = self.bin / "trackings"
         return file.read_text().splitlines() if file.exists() else []
 
     def fail(self, what):

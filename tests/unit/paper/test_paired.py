@@ -1,0 +1,52 @@
+"""Medians over runs of which some are lost, their ratios, and what may be said of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sgf_paper.paired import Estimate, estimate_median, ratios, verdict
+
+INF, NAN = math.inf, math.nan
+
+
+def test_the_median_counts_lost_runs_and_leaves_out_what_is_no_number():
+    assert estimate_median([3.0, 1.0, NAN, 2.0]).median == 2
+    assert estimate_median([1.0, 2.0, INF]).median == 2
+    assert estimate_median([1.0, INF]).median == estimate_median([INF, INF]).median == INF
+    assert estimate_median([3.0, NAN]).runs == 1
+    nothing = estimate_median([NAN])
+    assert nothing.runs == 0 and math.isnan(nothing.median) and math.isnan(nothing.low)
+
+
+def test_the_interval_holds_the_middle_of_many_runs_and_all_of_few():
+    few = estimate_median([5.0, 1.0, 9.0])
+    assert (few.low, few.high) == (1, 9)
+    many = estimate_median(np.arange(101.0))
+    # 101 / 2 +- 1.96 * sqrt(101) / 2 by the normal approximation
+    assert many.low == pytest.approx(40, abs=2) and many.high == pytest.approx(60, abs=2)
+    assert estimate_median([1.0] * 9 + [INF]) == Estimate(1, 1, 1, 10)
+    assert estimate_median([1.0] * 6 + [INF] * 4).high == INF
+
+
+def test_ratios_have_nothing_to_say_where_both_are_lost():
+    values = ratios([1.0, INF, 2.0, INF], [2.0, 1.0, INF, INF])
+    assert list(values[:3]) == [0.5, INF, 0] and math.isnan(values[3])
+
+
+@pytest.mark.parametrize(
+    "low, high, runs, said",
+    [
+        (0.5, 0.9, 10, "better"),
+        (0.5, 0.9, 9, "undecided"),
+        (0.9, 1.01, 10, "undecided"),
+        (1.1, INF, 10, "worse"),
+        (0.96, 1.04, 10, "equal"),
+        (0.96, 0.99, 10, "equal"),
+        (0.94, 0.99, 10, "better"),
+        (1.01, 1.06, 10, "worse"),
+        (NAN, NAN, 0, "undecided"),
+    ],
+)
+def test_a_verdict_takes_enough_runs_and_an_interval_on_one_side(low, high, runs, said):
+    assert verdict(Estimate(1.0, low, high, runs), least_runs=10, margin_pct=5) == said
