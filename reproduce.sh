@@ -150,14 +150,18 @@ build_progress() {
     }'
 }
 
-# build PRESET TESTS [TARGET...]: configures (TESTS: ON or OFF) and builds the targets, or the preset's.
-build() {
-  local preset=$1 tests=$2 log=$logs/build.log
-  shift 2
-  cmake --preset "$preset" "-DSGF_BUILD_TESTS=$tests" >"$logs/configure.log" 2>&1 || {
+# configure PRESET TESTS: TESTS is ON or OFF.
+configure() {
+  cmake --preset "$1" "-DSGF_BUILD_TESTS=$2" >"$logs/configure.log" 2>&1 || {
     tail -n 20 "$logs/configure.log" >&2
     fail "configuring failed; log: $logs/configure.log"
   }
+}
+
+# build PRESET [TARGET...]: builds the targets, or the preset's.
+build() {
+  local preset=$1 log=$logs/build.log
+  shift
   NINJA_STATUS='[%f/%t %e] ' cmake --build --preset "$preset" --parallel "$jobs" ${1+--target "$@"} 2>&1 |
     build_progress "$log" || {
     grep -m 5 -A 5 'error' "$log" >&2 || tail -n 20 "$log" >&2
@@ -171,6 +175,13 @@ tests_in_build() {
   grep -qs '^SGF_BUILD_TESTS:BOOL=ON$' build/release/CMakeCache.txt && echo ON || echo OFF
 }
 
+# Those programs of the MRPT module that experiments run; none where MRPT is missing.
+mrpt_programs() {
+  if grep -qs '^build sgf-odometry-cli:' build/release/build.ninja; then
+    printf '%s\n' dataset2rawlog sgf-odometry-cli
+  fi
+}
+
 # --- commands ------------------------------------------------------------------------------------
 
 clean() {
@@ -180,11 +191,15 @@ clean() {
 }
 
 run_experiments() {
+  local -a mrpt
   echo "== packages [run] [report]"
   install_packages run report
   echo "== build"
-  build release "$(tests_in_build)" sgf_align sgf_eval sgf_render sgf_stereo sgf_study \
-    stereo_bench
+  configure release "$(tests_in_build)"
+  mapfile -t mrpt < <(mrpt_programs)
+  ((${#mrpt[@]})) ||
+    printf '  the MRPT module and what it shows are left out; why: %s\n' "$logs/configure.log"
+  build release sgf_align sgf_eval sgf_render sgf_stereo sgf_study stereo_bench "${mrpt[@]}"
   cd paper
   exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${runs[@]}" \
     "${stages[@]}"
@@ -194,7 +209,8 @@ run_tests() {
   echo "== packages [run] [report] [test]"
   install_packages run report test
   echo "== build"
-  build "$preset" ON
+  configure "$preset" ON
+  build "$preset"
   echo "== tests"
   if [[ -n $data ]]; then export SGF_DATA=$data; fi
   exec ctest --preset "$preset" --parallel "$jobs"

@@ -406,29 +406,19 @@ class TrackedSequence:
         """Its folder. @param suite folder of the rendered suite."""
         return (suite if self.rendered else Path(data)) / self.folder
 
+    def frames_taken(self, full: bool) -> int:
+        """Frames of a run, 0 for all. @param full the full rendered suite, of which runs take all."""
+        return 0 if full and self.rendered else self.frames
+
 
 @dataclass
-class Odometry:
-    """What `sgf_align` runs on which sequences, and what is compared."""
+class SequenceExperiment:
+    """What is run on sequences."""
 
     kind: str
     name: str
     title: str
-    runs: int  # of each column, unless the command line says otherwise
-    first_frames: int  # that runs begin at
-    lost_below_pct: float  # frames with a pose
-    compared: list[str]
-    baselines: list[str]
-    verdict_runs: int  # fewer give no verdict
-    margin_pct: float
     sequences: dict[str, TrackedSequence]
-    conditions: dict[str, dict[str, Any]]
-    columns: dict[str, dict[str, Any]]
-
-    @property
-    def undisturbed(self) -> str:
-        """The condition that the others are compared with: the first."""
-        return next(iter(self.conditions))
 
     def present(self, data: str) -> list[str]:
         """Names of the sequences at hand: rendered ones always are.
@@ -441,14 +431,38 @@ class Odometry:
             if sequence.rendered or (data and sequence.path(Path(), data).is_dir())
         ]
 
+
+@dataclass
+class MrptMap(SequenceExperiment):
+    """Sequences that go through the MRPT module's programs."""
+
+
+@dataclass
+class Odometry(SequenceExperiment):
+    """What `sgf_align` runs on which sequences, and what is compared."""
+
+    runs: int  # of each column, unless the command line says otherwise
+    first_frames: int  # that runs begin at
+    lost_below_pct: float  # frames with a pose
+    compared: list[str]
+    baselines: list[str]
+    verdict_runs: int  # fewer give no verdict
+    margin_pct: float
+    conditions: dict[str, dict[str, Any]]
+    columns: dict[str, dict[str, Any]]
+
+    @property
+    def undisturbed(self) -> str:
+        """The condition that the others are compared with: the first."""
+        return next(iter(self.conditions))
+
     def first_frame(self, run: int) -> int:
         """Where a run begins: neighbouring runs far apart, all different for as long as that goes."""
         return FIRST_FRAME_STEP * run % self.first_frames
 
     def flags(self, sequence: str, full: bool, run: int, condition: str, column: str) -> list[str]:
         """Flags of `sgf_align` for a run, counted from 0. @param full the full rendered suite."""
-        tracked = self.sequences[sequence]
-        frames = 0 if full and tracked.rendered else tracked.frames
+        frames = self.sequences[sequence].frames_taken(full)
         change, alignment = self.conditions[condition], self.columns[column]
         values = {f"change.{key}": value for key, value in {**change, "seed": run + 1}.items()}
         values |= {f"alignment.{key}": value for key, value in alignment.items()}
@@ -498,8 +512,8 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, Odometry,
-    SemiDense, SelfMatch, ShiftProfile,
+    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
+    Odometry, SemiDense, SelfMatch, ShiftProfile,
 ]
 
 
@@ -630,12 +644,18 @@ def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
     return study
 
 
-def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
-    study = _build(Odometry, node, where)
-    study.sequences = {
+def _build_on_sequences(cls: type, node: dict[str, Any], where: str) -> Any:
+    """Makes dataclass `cls`, a SequenceExperiment, of a YAML map."""
+    experiment = _build(cls, node, where)
+    experiment.sequences = {
         name: _build(TrackedSequence, sequence, f"{where}: sequences.{name}")
-        for name, sequence in study.sequences.items()
+        for name, sequence in experiment.sequences.items()
     }
+    return experiment
+
+
+def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
+    study = _build_on_sequences(Odometry, node, where)
     for key in ("compared", "baselines"):
         if unknown := set(getattr(study, key)) - set(study.columns):
             raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
@@ -654,6 +674,7 @@ BUILDERS = {
     "density": partial(_build, Density),
     "disparity_figure": _build_figure,
     "light_change": _build_light_change,
+    "mrpt_map": partial(_build_on_sequences, MrptMap),
     "odometry": _build_odometry,
     "self_match": _build_self_match,
     "semi_dense": _build_semi_dense,

@@ -91,11 +91,18 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
     if stage.kind == "disparity_figure":
         return stage.group(datasets) is not None
     if stage.kind in (
-        "contact_sheet", "convergence", "odometry", "self_match", "semi_dense", "sequences",
+        "contact_sheet", "convergence", "mrpt_map", "odometry", "self_match", "semi_dense", "sequences",
         "shift_profile",
     ):  # fmt: skip
         return True  # rendered
     return stage.pair(datasets) is not None
+
+
+def obstacle(stage: Experiment, datasets: dict[str, Dataset], programs: Path) -> str:
+    """Why a stage cannot be made; empty if it can be."""
+    if stage.kind == "mrpt_map" and not (programs / "sgf-odometry-cli").exists():
+        return "the MRPT module is not part of the build"
+    return "" if has_data(stage, datasets) else "its data are not at hand"
 
 
 def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str]:
@@ -157,29 +164,34 @@ def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
     datasets = find_datasets(settings)
     for dataset in datasets.values():
         print(f"  {dataset.name}: {dataset.scenes} scenes in {dataset.folder}", flush=True)
-    runnable = [stage for stage in stages if has_data(stage, datasets)]
+    obstacles = {stage.name: obstacle(stage, datasets, settings.bin) for stage in stages}
+    runnable = [stage for stage in stages if not obstacles[stage.name]]
     if not runnable:
-        raise RunError("no data set at hand for any stage; see the lines above, or give --data")
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in obstacles.items())
+        raise RunError(f"nothing can be made ({reasons}); see the lines above, or give --data")
     print(f"== experiments: {' '.join(stage.name for stage in runnable)}", flush=True)
     passed = run_snakemake(settings, runnable, lock_file)
-    print_summary(settings, stages, runnable, datasets, started)
+    print_summary(settings, stages, obstacles, datasets, started)
     return passed
 
 
 def print_summary(
     settings: Settings,
     stages: list[Experiment],
-    runnable: list[Experiment],
+    obstacles: dict[str, str],
     datasets: dict[str, Dataset],
     started: float,
 ) -> None:
-    """Ends a run: what was made, where it lies, what was measured, what was absent."""
+    """Ends a run: what was made, where it lies, what was measured, what was absent.
+
+    @param obstacles why stages were left out, by name; empty for the others.
+    """
     print(f"== summary ({clock(time.time() - started)}; all files in {settings.results})")
     for stage in stages:
-        if stage in runnable:
-            print("\n".join(summary.stage_lines(stage, settings.results, started)))
+        if obstacles[stage.name]:
+            print(f"  {stage.name:14} left out: {obstacles[stage.name]}")
         else:
-            print(f"  {stage.name:14} left out: its data are not at hand")
+            print("\n".join(summary.stage_lines(stage, settings.results, started)))
     absent = summary.absent_datasets(stages, datasets)
     print("  Data sets absent: " + ("; ".join(absent) if absent else "none"), flush=True)
 

@@ -32,14 +32,15 @@ class PlyError(Exception):
 
 
 def read_ply(path: Path) -> np.ndarray:
-    """Vertices of a binary little-endian PLY file as a structured array."""
+    """Vertices of a binary little-endian PLY file without faces as a structured array."""
     data = path.read_bytes()
     header, mark, body = data.partition(b"end_header\n")
     lines = header.decode("ascii", "replace")
     count = re.search(r"^element vertex (\d+)$", lines, re.MULTILINE)
     if not (mark and count and lines.startswith("ply\nformat binary_little_endian 1.0\n")):
         raise PlyError(f"{path}: not a binary little-endian PLY file of vertices")
-    properties = re.findall(r"^property (\w+) (\w+)$", lines, re.MULTILINE)
+    of_vertices = lines[count.end() :].partition("\nelement ")[0]
+    properties = re.findall(r"^property (\w+) (\w+)$", of_vertices, re.MULTILINE)
     vertex = np.dtype([(name, PLY_TYPES[kind]) for kind, name in properties])
     if len(body) != int(count.group(1)) * vertex.itemsize:
         raise PlyError(f"{path}: {len(body)} bytes do not hold {count.group(1)} points")

@@ -17,6 +17,7 @@ FILES = {
     "benchmark": "tables/{}.md (.csv)",
     "contact_sheet": "figures/{}.png (.pdf)",
     "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
+    "mrpt_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "odometry": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _compared.csv, _runs.csv)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
@@ -31,6 +32,7 @@ MAIN_FILE = {
     "benchmark": "tables/{}.csv",
     "contact_sheet": "figures/{}.png",
     "convergence": "tables/{}.csv",
+    "mrpt_map": "tables/{}.csv",
     "odometry": "tables/{}.csv",
     "sequences": "tables/{}.csv",
     "semi_dense": "tables/{}.csv",
@@ -116,6 +118,15 @@ def _convergence_lines(path: Path, start_px: float) -> list[str]:
     return lines
 
 
+def _mrpt_map_lines(path: Path) -> list[str]:
+    """Per sequence the counts and the error."""
+    return [
+        f"{row.sequence}: {row.posed} of {row.frames} frames with pose, {row.keyframes} key-frames,"
+        f" {row.points} points, ATE RMSE {1000 * row.ate_rmse_m:.1f} mm"
+        for row in pd.read_csv(path).itertuples()
+    ]
+
+
 def _light_change_lines(path: Path) -> list[str]:
     """Per data set, region, case and matcher the columns by the rise of their mean error."""
     frame = pd.read_csv(path, dtype={"case": str}).dropna(subset="mean_px_rise")
@@ -154,6 +165,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _semi_dense_lines(main_file(stage, results), stage.drawn)
     if stage.kind == "convergence":
         return _convergence_lines(main_file(stage, results), stage.table_start["px"])
+    if stage.kind == "mrpt_map":
+        return _mrpt_map_lines(main_file(stage, results))
     if stage.kind == "odometry":
         return _odometry_lines(main_file(stage, results))
     if stage.kind == "self_match":

@@ -20,6 +20,9 @@ using Input = PixelAtDepth<float>;
 
 constexpr int kBatch = 64;  // points whose sums are taken together, in order
 
+// Coarser levels converge less closely: the next one goes on.
+constexpr double kCoarseTolerance = 10;
+
 }  // namespace
 
 class DirectAligner::Engine {
@@ -92,7 +95,9 @@ class DirectAligner::EngineOf : public Engine {
       state.warp = {level.camera, state.warp.T_cur_ref};
       const auto& image = ImageOf(current, l);
       loss.scale = Scale(level, image, state);
-      result.iterations += Descend(level, image, loss, state);
+      SolverOptions solver = options_.solver;
+      if (l > 0) solver.tolerance *= kCoarseTolerance;
+      result.iterations += Descend(level, image, loss, solver, state);
     }
     loss.scale = Scale(reference.levels[0], ImageOf(current, 0), state);
     result.T_cur_ref = state.warp.T_cur_ref;
@@ -200,18 +205,18 @@ class DirectAligner::EngineOf : public Engine {
   }
 
   int Descend(const Level& level, const typename Residual::Channels& image,
-              const RobustLoss<float>& loss, State& state) const {
+              const RobustLoss<float>& loss, const SolverOptions& solver, State& state) const {
     Equations last;
     if (options_.linearization == Linearization::kForward) {
       return Minimize<kParameters>(
                  state, [&](const State& s) { return Forward(level, image, loss, s); }, Step,
-                 options_.solver, last)
+                 solver, last)
           .iterations;
     }
     if constexpr (Residual::kInverseCompositional) {
       return Minimize<kParameters>(
                  state, [&](const State& s) { return Inverse(level, image, loss, s); }, InverseStep,
-                 options_.solver, last)
+                 solver, last)
           .iterations;
     }
     return 0;
@@ -236,12 +241,14 @@ class DirectAligner::EngineOf : public Engine {
     Equations total;
     for (const BatchEquations& batch :
          OverPatches<BatchEquations>(level, [&](size_t first, BatchEquations&sum) {
+           RobustCost<float> cost(loss);
            LinearizePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
                                  PixelsOf(level, first), [&](size_t, const auto& r, const auto& J) {
                                    const float s = r.squaredNorm();
                                    sum.Add(r, J, loss.Weight(s));
-                                   sum.AddCost(0.5 * loss.Rho(s));
+                                   cost.Add(s);
                                  });
+           sum.AddCost(cost.Value(), cost.residuals());
          }))
       total += batch;
     return total;
@@ -252,6 +259,7 @@ class DirectAligner::EngineOf : public Engine {
     Equations total;
     for (const BatchEquations& batch :
          OverPatches<BatchEquations>(level, [&](size_t first, BatchEquations&sum) {
+           RobustCost<float> cost(loss);
            EvaluatePatch<float>(state.residual, image, state.warp, InputsOf(level, first),
                                 PixelsOf(level, first), [&](size_t k, const auto& r) {
                                   const float s = r.squaredNorm();
@@ -261,8 +269,9 @@ class DirectAligner::EngineOf : public Engine {
                                     row(6) = r(d);
                                     sum.AddRow(row, weight);
                                   }
-                                  sum.AddCost(0.5 * loss.Rho(s));
+                                  cost.Add(s);
                                 });
+           sum.AddCost(cost.Value(), cost.residuals());
          }))
       total += batch;
     return total;
@@ -281,16 +290,18 @@ class DirectAligner::EngineOf : public Engine {
                     const RobustLoss<float>& loss, size_t first, Scatter& sum) const {
     const Level& level = reference.levels[0];
     BatchEquations patch;
+    RobustCost<float> cost(loss);
     const bool in_view = LinearizePatch<float>(state.residual, ImageOf(current, 0), state.warp,
                                                InputsOf(level, first), PixelsOf(level, first),
                                                [&](size_t, const auto& r, const auto& J) {
                                                  const float s = r.squaredNorm();
                                                  patch.Add(r, J, loss.Weight(s));
-                                                 patch.AddCost(0.5 * loss.Rho(s));
+                                                 cost.Add(s);
                                                  sum.weight += loss.Weight(s);
                                                  sum.curvature += loss.Curvature(s, kDim);
                                                });
     if (!in_view) return;
+    patch.AddCost(cost.Value(), cost.residuals());
     sum.equations += patch;
     sum.scatter += patch.b() * patch.b().transpose();
     ++sum.in_view;
@@ -403,19 +414,26 @@ DirectAligner::~DirectAligner() = default;
 DirectAligner::DirectAligner(DirectAligner&&) noexcept = default;
 DirectAligner& DirectAligner::operator=(DirectAligner&&) noexcept = default;
 
-Pyramid DirectAligner::MakePyramid(const cv::Mat& grey) const {
+void DirectAligner::MakePyramid(const cv::Mat& grey, Pyramid& pyramid) const {
   if (grey.cols != camera_.width || grey.rows != camera_.height)
     throw Error("image", fmt::format("is {}x{} px; the camera has {}x{}", grey.cols, grey.rows,
                                      camera_.width, camera_.height));
-  Pyramid pyramid{.size = grey.size()};
+  pyramid.size = grey.size();
   int levels = 1;
   while (levels < options_.levels &&
          (std::min(grey.cols, grey.rows) >> levels) >= options_.smallest_side_px)
     ++levels;
-  for (const cv::Mat1f& level : GreyPyramid(grey, levels)) {
-    pyramid.samples.push_back(MakeSampleChannels(level, options_.image));
-    if (options_.residual == "bit_planes") pyramid.bit_planes.push_back(MakeBitPlanes(level));
-  }
+  const std::vector<cv::Mat1f> greys = GreyPyramid(grey, levels);
+  pyramid.samples.resize(levels);
+  pyramid.bit_planes.resize(options_.residual == "bit_planes" ? levels : 0);
+  for (int l = 0; l < levels; ++l) MakeSampleChannels(greys[l], options_.image, pyramid.samples[l]);
+  for (size_t l = 0; l < pyramid.bit_planes.size(); ++l)
+    MakeBitPlanes(greys[l], pyramid.bit_planes[l]);
+}
+
+Pyramid DirectAligner::MakePyramid(const cv::Mat& grey) const {
+  Pyramid pyramid;
+  MakePyramid(grey, pyramid);
   return pyramid;
 }
 

@@ -70,7 +70,7 @@ void CheckOptions(const AlignmentOptions& options);
 
 /// The levels of an image as the chosen residual needs them.
 struct Pyramid {
-  cv::Size size;
+  cv::Size size = {};
   std::vector<SampleChannels> samples = {};
   std::vector<BitPlanes> bit_planes = {};  ///< empty unless the residual is bit_planes
 };
@@ -131,6 +131,9 @@ class DirectAligner {
 
   /// @param grey one channel, of the camera's size. @throws Error for any other image.
   Pyramid MakePyramid(const cv::Mat& grey) const;
+
+  /// The same into a pyramid whose memory is used again.
+  void MakePyramid(const cv::Mat& grey, Pyramid& pyramid) const;
 
   /// @param points of the image; patches that reach out of it are left out.
   std::shared_ptr<const Reference> MakeReference(const Pyramid& pyramid,

@@ -1,25 +1,27 @@
+#include <array>
+
 #include <opencv2/imgproc.hpp>
 
 #include <sgf/alignment/level.h>
 
 namespace sgf::alignment {
 
-SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options) {
-  const GradientImage gradient = ComputeGradient(grey, options.gradient);
+void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples) {
+  static thread_local GradientImage gradient;  // memory that is used again
+  ComputeGradient(grey, options.gradient, gradient);
   const cv::Mat1f epsilon = metrics::ComputeEpsilon(gradient, options.epsilon);
-  cv::Mat1f intensity;
-  grey.convertTo(intensity, CV_32F);
-  SampleChannels channels(grey.rows, grey.cols);
-  for (int y = 0; y < grey.rows; ++y) {
-    const float* planes[] = {intensity[y], gradient.x[y], gradient.y[y], epsilon[y]};
-    float* out = channels.At(y, 0);
-    for (int x = 0; x < grey.cols; ++x)
-      for (const float* plane : planes) *out++ = plane[x];
-  }
-  return channels;
+  cv::Mat1f intensity = grey;  // converts where it is not float
+  const cv::Mat planes[] = {intensity, gradient.x, gradient.y, epsilon};
+  samples.Assign(planes);
 }
 
-BitPlanes MakeBitPlanes(const cv::Mat& grey) {
+SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options) {
+  SampleChannels samples;
+  MakeSampleChannels(grey, options, samples);
+  return samples;
+}
+
+void MakeBitPlanes(const cv::Mat& grey, BitPlanes& planes) {
   RequireGreyImage(grey, "image");
   constexpr double kBefore = 0.75, kAfter = 1.5;  // px
   cv::Mat1f smooth;
@@ -27,18 +29,15 @@ BitPlanes MakeBitPlanes(const cv::Mat& grey) {
   cv::GaussianBlur(smooth, smooth, {}, kBefore, kBefore, cv::BORDER_REPLICATE);
   cv::Mat1f padded;
   cv::copyMakeBorder(smooth, padded, 1, 1, 1, 1, cv::BORDER_REPLICATE);
-  BitPlanes planes(grey.rows, grey.cols);
-  cv::Mat1f plane(grey.size());
+  std::array<cv::Mat, BitPlanes::kChannels> smoothed;
   for (int k = 0; k < BitPlanes::kChannels; ++k) {
     const int place = k < 4 ? k : k + 1;  // of the nine, without the centre
     const cv::Mat1f neighbour = padded(cv::Rect({place % 3, place / 3}, grey.size()));
-    for (int y = 0; y < grey.rows; ++y)
-      for (int x = 0; x < grey.cols; ++x) plane(y, x) = neighbour(y, x) > smooth(y, x) ? 1.f : 0.f;
-    cv::GaussianBlur(plane, plane, {}, kAfter, kAfter, cv::BORDER_REPLICATE);
-    for (int y = 0; y < grey.rows; ++y)
-      for (int x = 0; x < grey.cols; ++x) planes.At(y, x)[k] = plane(y, x);
+    cv::Mat1f plane;
+    cv::Mat(neighbour > smooth).convertTo(plane, CV_32F, 1 / 255.);
+    cv::GaussianBlur(plane, smoothed[k], {}, kAfter, kAfter, cv::BORDER_REPLICATE);
   }
-  return planes;
+  planes.Assign(smoothed);
 }
 
 std::vector<cv::Mat1f> GreyPyramid(const cv::Mat& grey, int levels) {

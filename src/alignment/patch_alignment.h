@@ -69,12 +69,14 @@ NormalEquations<double, Warp::kParameters> LinearizeWhole(const Residual& residu
                                                           const Warp& warp) {
   using T = typename Warp::Scalar;
   NormalEquations<double, Warp::kParameters> sum;
+  RobustCost<double> cost(loss);
   LinearizePatch<T>(residual, image, warp, patch.Inputs(), patch.References(),
                     [&](size_t, const auto& r, const auto& J) {
                       const double s = r.squaredNorm();
                       sum.Add(r.template cast<double>(), J.template cast<double>(), loss.Weight(s));
-                      sum.AddCost(0.5 * loss.Rho(s));
+                      cost.Add(s);
                     });
+  sum.AddCost(cost.Value(), cost.residuals());
   return sum;
 }
 

@@ -23,20 +23,11 @@ Vector2<T> GradientOf(const Eigen::Array<T, 4, 1>& channels) {
   return {channels[kGradientX], channels[kGradientY]};
 }
 
-/// Derivative of the intensity by what the place depends on, with J the derivative of the place.
-template <class T, class Jacobian>
-auto IntensityAlong(const ChannelsAt<T, 4>& at, const Jacobian& J) {
-  return (at.d_x[kIntensity] * J.row(0) + at.d_y[kIntensity] * J.row(1)).eval();
+/// Derivative of a channel by the place.
+template <class T, int N>
+Vector2<T> SlopeOf(const ChannelsAt<T, N>& at, int channel) {
+  return {at.d_x[channel], at.d_y[channel]};
 }
-
-/// A pixel of the current image seen from the reference: its sample with the gradient carried
-/// there, and how that depends on the warp's parameters.
-template <class T, int P>
-struct CarriedSample {
-  metrics::Sample<T> sample;
-  Eigen::Matrix<T, 1, P> d_intensity;
-  Eigen::Matrix<T, 2, P> d_gradient;
-};
 
 /// The sample of channels whose gradient is carried by A, g' = A^T g. Epsilon is a squared gradient
 /// of the image at hand and scales with A in the mean, by ||A||^2 / 2: a similarity leaves the
@@ -49,24 +40,20 @@ metrics::Sample<T> CarrySample(const Eigen::Array<T, 4, 1>& channels,
                                 static_cast<double>(channels[kEpsilon] * A.squaredNorm() / T(2)));
 }
 
-/// The sample with its derivative. With H, the derivative of the gradient by the place:
+/// Derivative by the warp's parameters of what changes by d_intensity and by w with a sample's
+/// intensity and carried gradient. With H, the derivative of the gradient by the place:
 ///
 ///     d I  = grad(I)^T dW/dp
 ///     d g' = A^T H dW/dp + (dA^T/dp) g
 ///
 /// Epsilon is held constant, as in the derivatives of the dissimilarities.
 template <class T, class Point>
-auto CarryWithDerivative(const ChannelsAt<T, 4>& at, const Point& point) {
-  const auto J = point.Jacobian();
-  constexpr int P = decltype(J)::ColsAtCompileTime;
-  const Eigen::Matrix<T, 2, 2> A = point.A();
-  Eigen::Matrix<T, 2, 2> H;
-  H << at.d_x[kGradientX], at.d_y[kGradientX], at.d_x[kGradientY], at.d_y[kGradientY];
-  CarriedSample<T, P> carried;
-  carried.sample = CarrySample<T>(at.value, A);
-  carried.d_intensity = IntensityAlong(at, J);
-  carried.d_gradient = (A.transpose() * H) * J + point.Turn(GradientOf(at.value));
-  return carried;
+auto BackToWarp(const ChannelsAt<T, 4>& at, const Point& point, T d_intensity,
+                const Vector2<T>& w) {
+  const Vector2<T> v = point.A() * w;
+  const Vector2<T> along = d_intensity * SlopeOf(at, kIntensity) + v.x() * SlopeOf(at, kGradientX) +
+                           v.y() * SlopeOf(at, kGradientY);
+  return (point.Along(along) + point.Turn(w, GradientOf(at.value))).eval();
 }
 
 /// Residual of a pointwise dissimilarity, Metric(current, reference).
@@ -103,10 +90,12 @@ struct PointResidual {
   Eigen::Matrix<T, kDim, 1> Linearize(const ChannelsAt<T, 4>& at, const Point& point,
                                       const Reference<T>& reference,
                                       Eigen::Matrix<T, kDim, P>& J) const {
-    const auto current = CarryWithDerivative(at, point);
-    const auto d = metric.Derivative(current.sample, reference);
-    J = d.intensity * current.d_intensity + d.gradient * current.d_gradient;
-    return Vectorized(metric(current.sample, reference));
+    const metrics::Sample<T> current = CarrySample<T>(at.value, point.A());
+    const auto d = metric.Derivative(current, reference);
+    for (int k = 0; k < kDim; ++k)
+      J.row(k) =
+          BackToWarp<T>(at, point, d.intensity(k), d.gradient.row(k).transpose()).transpose();
+    return Vectorized(metric(current, reference));
   }
 
  private:
@@ -149,7 +138,7 @@ struct AffinePhotoResidual {
   Eigen::Matrix<T, 1, 1> Linearize(const ChannelsAt<T, 4>& at, const Point& point, T reference,
                                    Eigen::Matrix<T, 1, P>& J) const {
     const T gain = T(std::exp(alpha));
-    J.template head<P - 2>() = gain * IntensityAlong(at, point.Jacobian());
+    J.template head<P - 2>() = point.Along(gain * SlopeOf(at, kIntensity)).transpose();
     J(P - 2) = gain * at.value[kIntensity];
     J(P - 1) = T(1);
     return Value<T>(at.value, {}, reference);
@@ -186,8 +175,7 @@ struct BitPlanesResidual {
   template <class T, class Point, int P>
   Eigen::Matrix<T, 8, 1> Linearize(const ChannelsAt<T, 8>& at, const Point& point,
                                    const Reference<T>& reference, Eigen::Matrix<T, 8, P>& J) const {
-    const auto J_pixel = point.Jacobian();
-    J = at.d_x.matrix() * J_pixel.row(0) + at.d_y.matrix() * J_pixel.row(1);
+    for (int k = 0; k < kDim; ++k) J.row(k) = point.Along(SlopeOf(at, k)).transpose();
     return (at.value - reference).matrix();
   }
 };
@@ -275,7 +263,7 @@ bool LinearizePatch(const Residual& residual, const Image& image, const Warp& wa
     for (size_t k = 0; k < inputs.size(); ++k) {
       const auto at = image.Sample(points[k].pixel);
       samples[k] = Residual::template MakeReference<T>(at);
-      J_intensity.row(k) = IntensityAlong(at, points[k].Jacobian());
+      J_intensity.row(k) = points[k].Along(SlopeOf(at, kIntensity)).transpose();
     }
     const std::span<const metrics::Sample<T>> current(samples.data(), inputs.size());
     const auto r = metrics::Lssd{}(current, references);

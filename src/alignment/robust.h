@@ -41,17 +41,55 @@ struct RobustLoss {
   T Rho(T s) const {
     if (kind == RobustKind::kHuber && s > HuberLimit())
       return T(2) * std::sqrt(HuberLimit() * s) - HuberLimit();
-    if (kind == RobustKind::kStudentT)
-      return T(kFreedom + 1) * scale * scale * std::log1p(s / (T(kFreedom) * scale * scale));
+    if (kind == RobustKind::kStudentT) return LogFactor() * std::log1p(s * InverseSpread());
     return s;
   }
 
  private:
+  template <class U>
+  friend class RobustCost;
+
   static constexpr double kFreedom = 5;
   T HuberLimit() const {
     const T k = T(1.345) * scale;
     return k * k;
   }
+  T LogFactor() const { return T(kFreedom + 1) * scale * scale; }
+  T InverseSpread() const { return T(1) / (T(kFreedom) * scale * scale); }
+};
+
+/// The cost of many residuals, the sum of rho(s) / 2. Takes one logarithm of a product where the
+/// sum would take many.
+template <class T>
+class RobustCost {
+ public:
+  explicit RobustCost(const RobustLoss<T>& loss)
+      : loss_(loss), log_factor_(loss.LogFactor()), inverse_spread_(loss.InverseSpread()) {}
+
+  void Add(T s) {
+    ++residuals_;
+    if (loss_.kind == RobustKind::kStudentT)
+      Multiply(1 + double(s) * inverse_spread_);
+    else
+      sum_ += loss_.Rho(s);
+  }
+
+  int residuals() const { return residuals_; }
+  double Value() const { return 0.5 * (sum_ + log_factor_ * std::log(product_)); }
+
+ private:
+  void Multiply(double factor) {
+    constexpr double kMost = 1e100;  // far from overflow by one more factor
+    product_ *= factor;
+    if (product_ < kMost) return;
+    sum_ += log_factor_ * std::log(product_);
+    product_ = 1;
+  }
+
+  const RobustLoss<T>& loss_;
+  double log_factor_, inverse_spread_;
+  double sum_ = 0, product_ = 1;
+  int residuals_ = 0;
 };
 
 }  // namespace sgf::alignment

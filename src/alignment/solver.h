@@ -50,9 +50,9 @@ class NormalEquations {
   using Row = Eigen::Matrix<T, kRow, 1>;
   void AddRow(const Row& row, T weight) { sum_.noalias() += row * (weight * row).transpose(); }
 
-  void AddCost(double cost) {
+  void AddCost(double cost, int residuals) {
     cost_ += cost;
-    ++residuals_;
+    residuals_ += residuals;
   }
 
   template <class U>
@@ -84,6 +84,35 @@ struct SolverSummary {
   bool converged = false;
 };
 
+/// Length of the next step against that of Gauss-Newton, from the steps before (Barzilai and
+/// Borwein, 1988, in the metric of the normal equations). Gauss-Newton halves the distance to a
+/// minimum where residuals vanish together with their slopes, as costs like sgf do, and goes too
+/// far where noise keeps them from vanishing; both show in how its steps follow one another.
+template <int P>
+class StepLength {
+ public:
+  using Parameters = Eigen::Matrix<double, P, 1>;
+
+  double Next(const Parameters& step, const Eigen::Matrix<double, P, P>& H) {
+    if (taken_) {
+      const double ratio = before_.dot(H * step) / before_.dot(H * before_);
+      length_ = ratio < 1 ? std::clamp(length_ / (1 - ratio), kLeast, kMost) : kMost;
+    }
+    before_ = step;
+    taken_ = true;
+    return length_;
+  }
+
+  /// After a step that was taken back.
+  void Reset() { *this = {}; }
+
+ private:
+  static constexpr double kLeast = 0.5, kMost = 2;
+  Parameters before_ = Parameters::Zero();
+  double length_ = 1;
+  bool taken_ = false;
+};
+
 /// Minimises from `state`. Linearises once an iteration: a step is judged by the linearisation at
 /// its end, and taken back where the mean cost has risen or too few residuals stay in view
 /// (Levenberg-Marquardt).
@@ -95,11 +124,13 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
                        const SolverOptions& options, NormalEquations<double, P>& last) {
   constexpr double kLeastInView = 0.7;  // the mean must not fall by looking away
   constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-7, kMostDamping = 1e4;
+  constexpr double kDampingAfterRise = 1;  // half the step: one little shorter would rise as well
   const bool damped = options.method == SolverMethod::kLevenbergMarquardt;
   double damping = damped ? kFirstDamping : 0;
   SolverSummary summary;
   last = linearize(state);
   int most_in_view = last.residuals();
+  StepLength<P> length;
   while (summary.iterations < options.max_iterations && last.residuals() > 0) {
     Eigen::Matrix<double, P, P> H = last.H();
     H.diagonal() *= 1 + damping;
@@ -112,11 +143,12 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
       summary.converged = promised >= 0;
       break;
     }
-    State next = update(state, delta);
+    State next = update(state, damped ? length.Next(delta, last.H()) * delta : delta);
     NormalEquations<double, P> equations = linearize(next);
     const bool in_view = equations.residuals() >= kLeastInView * most_in_view;
     if (damped && !(in_view && equations.MeanCost() <= last.MeanCost())) {
-      damping = std::max(damping, kLeastDamping) * 10;
+      length.Reset();
+      damping = std::max(damping * 10, kDampingAfterRise);
       if (damping > kMostDamping) {
         summary.converged = true;  // no step lowers the cost
         break;

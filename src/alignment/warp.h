@@ -13,8 +13,12 @@
 ///
 /// A gradient is a vector: to be compared with one of the reference it is carried there, as A^T
 /// grad I with A = dW/du. The chain rule of a carried gradient thus has two terms, one from the
-/// gradient's own change with the place and one from A's change, which every warp states as
-/// Turn(v) = d(A^T v)/dp at constant v.
+/// gradient's own change with the place and one from A's change. Derivatives are handed back from
+/// the residual to the parameters, as rows (reverse mode), in two parts that every warp's Point
+/// has:
+///
+///     Along(c)   = c^T dW/dp
+///     Turn(w, v) = w^T d(A^T v)/dp    at constant w and v
 namespace sgf::alignment {
 
 template <class T>
@@ -22,13 +26,6 @@ using Vector2 = Eigen::Matrix<T, 2, 1>;
 
 template <class T>
 using Vector3 = Eigen::Matrix<T, 3, 1>;
-
-/// The cross product as a matrix: Cross(a) b = a x b.
-template <class T>
-Eigen::Matrix<T, 3, 3> Cross(const Vector3<T>& a) {
-  return (Eigen::Matrix<T, 3, 3>() << T(0), -a.z(), a.y(), a.z(), T(0), -a.x(), -a.y(), a.x(), T(0))
-      .finished();
-}
 
 /// Camera coordinates at depth 1 of a pixel of a camera without distortion.
 template <class T>
@@ -53,9 +50,9 @@ struct TranslationWarp {
   struct Point {
     Vector2<T> pixel;
     Eigen::Matrix<T, 2, 2> A() const { return Eigen::Matrix<T, 2, 2>::Identity(); }
-    Eigen::Matrix<T, 2, 2> Jacobian() const { return Eigen::Matrix<T, 2, 2>::Identity(); }
-    Eigen::Matrix<T, 2, 2> Turn(const Vector2<T>& /*v*/) const {
-      return Eigen::Matrix<T, 2, 2>::Zero();
+    Vector2<T> Along(const Vector2<T>& c) const { return c; }
+    Vector2<T> Turn(const Vector2<T>& /*w*/, const Vector2<T>& /*v*/) const {
+      return Vector2<T>::Zero();
     }
   };
 
@@ -83,18 +80,19 @@ struct PlanarWarp {
 
     const Eigen::Matrix<T, 2, 2>& A() const { return a; }
 
-    Eigen::Matrix<T, 2, kParameters> Jacobian() const {
-      Eigen::Matrix<T, 2, kParameters> J;
-      J.template leftCols<2>().setIdentity();
-      J.col(2) = Vector2<T>(-arm.y(), arm.x());
-      if constexpr (kScaled) J.col(3) = arm;
-      return J;
+    Parameters Along(const Vector2<T>& c) const {
+      Parameters along;
+      along.template head<2>() = c;
+      along(2) = c.y() * arm.x() - c.x() * arm.y();
+      if constexpr (kScaled) along(3) = c.dot(arm);
+      return along;
     }
 
-    Eigen::Matrix<T, 2, kParameters> Turn(const Vector2<T>& v) const {
-      Eigen::Matrix<T, 2, kParameters> turn = Eigen::Matrix<T, 2, kParameters>::Zero();
-      turn.col(2) = a.transpose() * Vector2<T>(v.y(), -v.x());
-      if constexpr (kScaled) turn.col(3) = a.transpose() * v;
+    Parameters Turn(const Vector2<T>& w, const Vector2<T>& v) const {
+      const Vector2<T> forth = a * w;
+      Parameters turn = Parameters::Zero();
+      turn(2) = forth.x() * v.y() - forth.y() * v.x();
+      if constexpr (kScaled) turn(3) = forth.dot(v);
       return turn;
     }
   };
@@ -136,23 +134,32 @@ struct PixelAtDepth {
 namespace warp_internal {
 
 /// Projection of X = R ray + inverse_depth p and what its derivatives are made of:
-/// dX/du = R diag(1/fx, 1/fy) + p slope^T.
+/// dX/du = R diag(1/fx, 1/fy) + p slope^T, and d pixel / d X = [fx 0 -fx x; 0 fy -fy y] / z with
+/// x = X/z and y = Y/z.
 template <class T>
 struct Projection {
   Vector2<T> pixel;
   Vector3<T> X;
-  Eigen::Matrix<T, 2, 3> d_X;  ///< d pixel / d X
-  Eigen::Matrix<T, 3, 2> d_u;  ///< d X / d u
-  T fx, fy;
+  Vector3<T> d_ux, d_uy;  ///< d X / d u, column by column
+  T fx_z, fy_z, x, y, inv_z;
 
-  Eigen::Matrix<T, 2, 2> A() const { return d_X * d_u; }
+  Eigen::Matrix<T, 2, 2> A() const {
+    Eigen::Matrix<T, 2, 2> A;
+    A << fx_z * (d_ux.x() - x * d_ux.z()), fx_z * (d_uy.x() - x * d_uy.z()),
+        fy_z * (d_ux.y() - y * d_ux.z()), fy_z * (d_uy.y() - y * d_uy.z());
+    return A;
+  }
 
-  /// Second derivative of v . pixel by X.
-  Eigen::Matrix<T, 3, 3> Hessian(const Vector2<T>& v) const {
-    const T iz = T(1) / X.z();
-    const T a = -v.x() * fx * iz * iz, b = -v.y() * fy * iz * iz;
-    const T c = T(-2) * (a * X.x() + b * X.y()) * iz;
-    return (Eigen::Matrix<T, 3, 3>() << T(0), T(0), a, T(0), T(0), b, a, b, c).finished();
+  /// v^T d pixel / d X
+  Vector3<T> BackToX(const Vector2<T>& v) const {
+    const T a = fx_z * v.x(), b = fy_z * v.y();
+    return {a, b, -(a * x + b * y)};
+  }
+
+  /// The second derivative of v . pixel by X, times t.
+  Vector3<T> HessianTimes(const Vector2<T>& v, const Vector3<T>& t) const {
+    const T a = -fx_z * inv_z * v.x(), b = -fy_z * inv_z * v.y();
+    return {a * t.z(), b * t.z(), a * t.x() + b * t.y() - T(2) * (a * x + b * y) * t.z()};
   }
 };
 
@@ -162,6 +169,7 @@ struct Projector {
   T fx, fy, cx, cy;
   Eigen::Matrix<T, 3, 3> R;
   Vector3<T> p;
+  Vector3<T> R_per_px_x, R_per_px_y;  ///< R's first columns over fx and fy
 
   Projector() = default;
   Projector(const Camera& camera, const SE3& T_cur_ref)
@@ -170,20 +178,22 @@ struct Projector {
         cx(T(camera.cx)),
         cy(T(camera.cy)),
         R(T_cur_ref.R.toRotationMatrix().cast<T>()),
-        p(T_cur_ref.p.cast<T>()) {}
+        p(T_cur_ref.p.cast<T>()),
+        R_per_px_x(R.col(0) / fx),
+        R_per_px_y(R.col(1) / fy) {}
 
   /// @return false for a point that is not in front of the camera.
   bool operator()(const PixelAtDepth<T>& u, Projection<T>& out) const {
     out.X = R.col(0) * u.ray.x() + R.col(1) * u.ray.y() + R.col(2) + u.inverse_depth * p;
     if (!(out.X.z() > T(1e-3))) return false;
-    const T iz = T(1) / out.X.z();
-    const T x = out.X.x() * iz, y = out.X.y() * iz;
-    out.pixel = {fx * x + cx, fy * y + cy};
-    out.d_X << fx * iz, T(0), -fx * x * iz, T(0), fy * iz, -fy * y * iz;
-    out.d_u.col(0) = R.col(0) / fx + p * u.slope.x();
-    out.d_u.col(1) = R.col(1) / fy + p * u.slope.y();
-    out.fx = fx;
-    out.fy = fy;
+    out.inv_z = T(1) / out.X.z();
+    out.x = out.X.x() * out.inv_z;
+    out.y = out.X.y() * out.inv_z;
+    out.pixel = {fx * out.x + cx, fy * out.y + cy};
+    out.fx_z = fx * out.inv_z;
+    out.fy_z = fy * out.inv_z;
+    out.d_ux = R_per_px_x + p * u.slope.x();
+    out.d_uy = R_per_px_y + p * u.slope.y();
     return true;
   }
 };
@@ -203,24 +213,26 @@ struct Se3Warp {
     T inverse_depth;
     Vector2<T> slope;
 
-    /// d X / d p = [inverse_depth I, -[X]x]
-    Eigen::Matrix<T, 3, 6> Motion() const {
-      Eigen::Matrix<T, 3, 6> motion;
-      motion.template leftCols<3>() = inverse_depth * Eigen::Matrix<T, 3, 3>::Identity();
-      motion.template rightCols<3>() = -Cross<T>(this->X);
-      return motion;
-    }
-    Eigen::Matrix<T, 2, 6> Jacobian() const { return this->d_X * Motion(); }
+    Parameters Along(const Vector2<T>& c) const { return AlongX(this->BackToX(c)); }
 
-    /// With q = d_X^T v: d_u^T (Hessian(v) dX/dp + [0, [q]x]) + [slope q^T, 0], since d_u turns
-    /// with the motion and the translation carries the slope.
-    Eigen::Matrix<T, 2, 6> Turn(const Vector2<T>& v) const {
-      const Vector3<T> q = this->d_X.transpose() * v;
-      Eigen::Matrix<T, 3, 6> d_q = this->Hessian(v) * Motion();
-      d_q.template rightCols<3>() += Cross<T>(q);
-      Eigen::Matrix<T, 2, 6> turn = this->d_u.transpose() * d_q;
-      turn.template leftCols<3>() += slope * q.transpose();
+    /// With A^T v = d_u^T q for q = v^T d pixel / d X, and t = d_u w: q changes by the Hessian with
+    /// X, d_u turns with the motion, and the translation carries the slope.
+    Parameters Turn(const Vector2<T>& w, const Vector2<T>& v) const {
+      const Vector3<T> t = this->d_ux * w.x() + this->d_uy * w.y();
+      const Vector3<T> q = this->BackToX(v);
+      Parameters turn = AlongX(this->HessianTimes(v, t));
+      turn.template head<3>() += slope.dot(w) * q;
+      turn.template tail<3>() += t.cross(q);
       return turn;
+    }
+
+   private:
+    /// m^T dX/dp = m^T [inverse_depth I, -[X]x]
+    Parameters AlongX(const Vector3<T>& m) const {
+      Parameters along;
+      along.template head<3>() = inverse_depth * m;
+      along.template tail<3>() = this->X.cross(m);
+      return along;
     }
   };
 
@@ -253,9 +265,10 @@ struct EpipolarWarp {
 
   struct Point : warp_internal::Projection<T> {
     Vector3<T> p;
-    Vector2<T> Jacobian() const { return this->d_X * p; }
-    Vector2<T> Turn(const Vector2<T>& v) const {
-      return this->d_u.transpose() * (this->Hessian(v) * p);
+    Parameters Along(const Vector2<T>& c) const { return Parameters(this->BackToX(c).dot(p)); }
+    Parameters Turn(const Vector2<T>& w, const Vector2<T>& v) const {
+      const Vector3<T> t = this->d_ux * w.x() + this->d_uy * w.y();
+      return Parameters(this->HessianTimes(v, p).dot(t));
     }
   };
 

@@ -79,18 +79,21 @@ class FrameSource {
   }
 
   odometry::FrameResult Track(const OdometryFrame& frame, odometry::Odometry& odometry) {
-    const cv::Mat1b left = Load(frame.left, frame.time_ns);
+    const cv::Mat1b left = Load(frame.left, frame.time_ns, sequence_.cameras[0].camera);
     if (!rectifier_)
       return odometry.ProcessDepth(frame.time_ns, left,
                                    ReadDepth(frame.depth, sequence_.depth_levels_per_m));
     const auto [rect_left, rect_right] =
-        rectifier_->Rectify(left, Load(frame.right, frame.time_ns));
+        rectifier_->Rectify(left, Load(frame.right, frame.time_ns, sequence_.cameras[1].camera));
     return odometry.ProcessStereo(frame.time_ns, rect_left, rect_right);
   }
 
  private:
-  cv::Mat1b Load(const fs::path& path, std::int64_t time_ns) {
+  cv::Mat1b Load(const fs::path& path, std::int64_t time_ns, const Camera& camera) {
     cv::Mat1b image = ReadGrey(path);
+    if (image.size() != cv::Size(camera.width, camera.height))
+      throw Error(path.string(), fmt::format("has {}x{} px, the camera {}x{}", image.cols,
+                                             image.rows, camera.width, camera.height));
     if (!ChangesNothing(change_))
       image = ApplyChange(image, ChangeAt(change_, time_ns - sequence_.frames[0].time_ns), 0);
     clipped_ += ClippedShare(image);
@@ -248,9 +251,12 @@ void RunAlign(const Arguments& arguments, const OptionFlags& flags) {
                                  layout.emplace());
   FrameSource source(OpenOdometrySequence(arguments.sequence, layout, options.rgbd),
                      options.change);
-  const Run run = TrackSequence(source, Chosen(source.sequence(), arguments), options);
+  const auto frames = Chosen(source.sequence(), arguments);
   const fs::path folder = arguments.output;
-  MakeFolder(folder);
+  MakeFolder(folder);  // before the work, which would be lost
+  if (const int skipped = source.sequence().skipped_frames)
+    spdlog::warn("left out: {} x frame with a missing file", skipped);
+  const Run run = TrackSequence(source, frames, options);
   WriteTrajectory(folder / "trajectory.txt", run.trajectory);
   WriteFrames(folder / "frames.csv", run);
   WriteTimings(folder / "timings.csv", run);

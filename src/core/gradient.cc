@@ -22,18 +22,22 @@ void RequireGreyImage(const cv::Mat& image, const char* name) {
     throw Error(name, fmt::format("unsupported pixel type {}", cv::typeToString(image.type())));
 }
 
-GradientImage ComputeGradient(const cv::Mat& image, GradientOperator op) {
+void ComputeGradient(const cv::Mat& image, GradientOperator op, GradientImage& gradient) {
   RequireGreyImage(image, "gradient input");
   const cv::Matx13f derivative(-0.5F, 0, 0.5F);
   const cv::Matx13f across = op == GradientOperator::kScharr
                                  ? cv::Matx13f(3 / 16.F, 10 / 16.F, 3 / 16.F)
                                  : cv::Matx13f(0, 1, 0);
-  GradientImage gradient;
   const cv::Point centre(-1, -1);
   // Isolated: a part of a larger image is an image of its own.
   constexpr int kBorder = cv::BORDER_REPLICATE | cv::BORDER_ISOLATED;
   cv::sepFilter2D(image, gradient.x, CV_32F, derivative, across, centre, 0, kBorder);
   cv::sepFilter2D(image, gradient.y, CV_32F, across, derivative, centre, 0, kBorder);
+}
+
+GradientImage ComputeGradient(const cv::Mat& image, GradientOperator op) {
+  GradientImage gradient;
+  ComputeGradient(image, op, gradient);
   return gradient;
 }
 

@@ -28,6 +28,9 @@ struct GradientImage {
 /// @throws Error for an empty image or one with more than one channel.
 GradientImage ComputeGradient(const cv::Mat& image, GradientOperator op);
 
+/// The same into a gradient whose memory is used again where it has the size.
+void ComputeGradient(const cv::Mat& image, GradientOperator op, GradientImage& gradient);
+
 /// Mean squared gradient magnitude over the image: the paper's epsilon (eq. 6), (grey levels/px)^2.
 double MeanSquaredGradient(const GradientImage& gradient);
 

@@ -112,9 +112,8 @@ class Odometry::Impl {
     if (rig_.baseline_m <= 0) throw Error("rig", "has no baseline for stereo pairs");
     CheckFrame(time_ns, left);
     CheckImage(right);
-    return Process(time_ns, left, [&](const alignment::Pyramid& pyramid, StageTimes& times) {
-      return StereoPoints(pyramid, left, right, times);
-    });
+    return Process(time_ns, left,
+                   [&](StageTimes& times) { return StereoPoints(left, right, times); });
   }
 
   FrameResult ProcessDepth(std::int64_t time_ns, const cv::Mat& grey, const cv::Mat1f& depth_m) {
@@ -122,9 +121,7 @@ class Odometry::Impl {
     if (depth_m.size() != grey.size())
       throw Error("depth image", fmt::format("is {}x{} px; the camera has {}x{}", depth_m.cols,
                                              depth_m.rows, grey.cols, grey.rows));
-    return Process(time_ns, grey, [&](const alignment::Pyramid& pyramid, StageTimes& times) {
-      return DepthPoints(pyramid, depth_m, times);
-    });
+    return Process(time_ns, grey, [&](StageTimes& times) { return DepthPoints(depth_m, times); });
   }
 
   void ProcessGyro(std::int64_t time_ns, const Eigen::Vector3d& gyro) { gyro_.Add(time_ns, gyro); }
@@ -136,7 +133,7 @@ class Odometry::Impl {
 
  private:
   using Points = std::vector<alignment::ReferencePoint>;
-  using MakePoints = std::function<Points(const alignment::Pyramid&, StageTimes&)>;
+  using MakePoints = std::function<Points(StageTimes&)>;  ///< of the frame in pyramid_
 
   struct Reference {
     int index = 0;
@@ -171,17 +168,17 @@ class Odometry::Impl {
   FrameResult Process(std::int64_t time_ns, const cv::Mat& grey, const MakePoints& make_points) {
     FrameResult result{.time_ns = time_ns};
     Stopwatch total, stage;
-    const alignment::Pyramid pyramid = aligner_.MakePyramid(grey);
+    aligner_.MakePyramid(grey, pyramid_);
     result.times.pyramid_s = stage.Lap();
     if (references_.empty()) {
       result.state = TrackingState::kInitialised;
     } else {
-      Track(pyramid, Predict(time_ns), result);
+      Track(Predict(time_ns), result);
     }
     result.times.alignment_s = stage.Lap();
     lost_frames_ = result.state == TrackingState::kLost ? lost_frames_ + 1 : 0;
     if (lost_frames_ > options_.lost_frames) result.state = TrackingState::kInitialised;
-    if (NeedsKeyframe(result)) AddKeyframe(pyramid, make_points, result);
+    if (NeedsKeyframe(result)) AddKeyframe(make_points, result);
     Remember(result);
     result.times.total_s = total.Lap();
     return result;
@@ -198,22 +195,21 @@ class Odometry::Impl {
 
   /// Aligns with the last key-frame and, while that fails, from other guesses and with key-frames
   /// before it.
-  void Track(const alignment::Pyramid& pyramid, const SE3& predicted, FrameResult& result) const {
+  void Track(const SE3& predicted, FrameResult& result) const {
     result.T_world_cam = predicted;
     const Reference& last = references_.back();
     const int all = options_.alignment.levels;
-    if (TrackFrom(last, pyramid, predicted, options_.tracking_levels, result) ||
-        TrackFrom(last, pyramid, predicted, all, result) ||
-        TrackFrom(last, pyramid, last_->T_world_cam, all, result))
+    if (TrackFrom(last, predicted, options_.tracking_levels, result) ||
+        TrackFrom(last, predicted, all, result) || TrackFrom(last, last_->T_world_cam, all, result))
       return;
     for (auto reference = references_.rbegin(); reference != references_.rend(); ++reference)
-      if (TrackFrom(*reference, pyramid, reference->keyframe.T_world_cam, all, result)) return;
+      if (TrackFrom(*reference, reference->keyframe.T_world_cam, all, result)) return;
   }
 
-  bool TrackFrom(const Reference& reference, const alignment::Pyramid& pyramid,
-                 const SE3& T_world_cam, int levels, FrameResult& result) const {
+  bool TrackFrom(const Reference& reference, const SE3& T_world_cam, int levels,
+                 FrameResult& result) const {
     const alignment::AlignmentResult aligned =
-        aligner_.Align(*reference.patches, pyramid,
+        aligner_.Align(*reference.patches, pyramid_,
                        T_world_cam.Inverse() * reference.keyframe.T_world_cam, levels);
     result.iterations += aligned.iterations;
     result.keyframe = reference.index;
@@ -236,15 +232,14 @@ class Odometry::Impl {
             result.keyframe != references_.back().index);
   }
 
-  void AddKeyframe(const alignment::Pyramid& pyramid, const MakePoints& make_points,
-                   FrameResult& result) {
-    Points points = make_points(pyramid, result.times);
+  void AddKeyframe(const MakePoints& make_points, FrameResult& result) {
+    Points points = make_points(result.times);
     if (static_cast<int>(points.size()) < options_.alignment.min_points) {
       if (result.state == TrackingState::kInitialised) result.state = TrackingState::kLost;
       return;
     }
     Stopwatch stage;
-    Reference reference{.index = keyframes_++, .patches = aligner_.MakeReference(pyramid, points)};
+    Reference reference{.index = keyframes_++, .patches = aligner_.MakeReference(pyramid_, points)};
     reference.keyframe = {result.time_ns, result.T_world_cam, std::move(points)};
     references_.push_back(std::move(reference));
     if (static_cast<int>(references_.size()) > std::max(1, options_.relocation_keyframes))
@@ -262,29 +257,27 @@ class Odometry::Impl {
     last_ = next;
   }
 
-  Points StereoPoints(const alignment::Pyramid& pyramid, const cv::Mat& left, const cv::Mat& right,
-                      StageTimes& times) const {
+  Points StereoPoints(const cv::Mat& left, const cv::Mat& right, StageTimes& times) {
     Stopwatch stage;
     cv::Mat1s disparity;
     matcher_.Compute(left, right, disparity);
     times.depth_s = stage.Lap();
     const double scale = 1.0 / (rig_.camera.fx * rig_.baseline_m);
-    Points points = Select(pyramid, [&](int y, int x) {
+    Points points = Select([&](int y, int x) {
       return disparity(y, x) > 0 ? static_cast<float>(disparity(y, x) / 16.0 * scale) : 0.f;
     });
     if (options_.refinement.enabled) {
-      const auto right_channels = alignment::MakeSampleChannels(right, options_.alignment.image);
-      RefineDepths(pyramid.samples[0], right_channels, rig_.camera, rig_.baseline_m,
+      alignment::MakeSampleChannels(right, options_.alignment.image, right_samples_);
+      RefineDepths(pyramid_.samples[0], right_samples_, rig_.camera, rig_.baseline_m,
                    options_.refinement, points);
     }
     times.selection_s = stage.Lap();
     return points;
   }
 
-  Points DepthPoints(const alignment::Pyramid& pyramid, const cv::Mat1f& depth_m,
-                     StageTimes& times) const {
+  Points DepthPoints(const cv::Mat1f& depth_m, StageTimes& times) const {
     Stopwatch stage;
-    Points points = Select(pyramid, [&](int y, int x) {
+    Points points = Select([&](int y, int x) {
       const float depth = depth_m(y, x);
       return std::isfinite(depth) && depth > 0 ? 1 / depth : 0.f;
     });
@@ -294,10 +287,10 @@ class Odometry::Impl {
 
   /// @param inverse_depth of a pixel, 1/m; 0 where unknown.
   template <class InverseDepth>
-  Points Select(const alignment::Pyramid& pyramid, const InverseDepth& inverse_depth) const {
+  Points Select(const InverseDepth& inverse_depth) const {
     const auto nearest = static_cast<float>(1 / options_.min_depth_m);
     const auto farthest = static_cast<float>(1 / options_.max_depth_m);
-    cv::Mat1b eligible(pyramid.size);
+    cv::Mat1b eligible(pyramid_.size);
     for (int y = 0; y < eligible.rows; ++y)
       for (int x = 0; x < eligible.cols; ++x) {
         const float value = inverse_depth(y, x);
@@ -305,9 +298,9 @@ class Odometry::Impl {
       }
     Points points;
     for (const cv::Point& p :
-         alignment::SelectPoints(pyramid.samples[0], eligible, options_.selection))
+         alignment::SelectPoints(pyramid_.samples[0], eligible, options_.selection))
       points.push_back({Eigen::Vector2f(static_cast<float>(p.x), static_cast<float>(p.y)),
-                        inverse_depth(p.y, p.x), SlopeAt(p, pyramid.size, inverse_depth)});
+                        inverse_depth(p.y, p.x), SlopeAt(p, pyramid_.size, inverse_depth)});
     return points;
   }
 
@@ -315,6 +308,8 @@ class Odometry::Impl {
   OdometryOptions options_;
   alignment::DirectAligner aligner_;
   stereo::BlockMatcher matcher_;
+  alignment::Pyramid pyramid_;  ///< of the frame at hand
+  alignment::SampleChannels right_samples_;
   std::deque<Reference> references_;
   int keyframes_ = 0;
   int lost_frames_ = 0;

@@ -8,6 +8,7 @@ from conftest import PROJECT
 
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 PROGRAMS = "sgf_align sgf_eval sgf_render sgf_stereo sgf_study stereo_bench"
+MRPT_PROGRAMS = "dataset2rawlog sgf-odometry-cli"
 APT_LINE = "sudo apt-get update && sudo apt-get install -y --no-install-recommends "
 
 
@@ -148,11 +149,23 @@ def test_the_sanitizers_have_a_build_of_their_own(project):
 def test_a_run_builds_only_the_programs_and_keeps_a_developers_tests(project):
     project.run("--only", "table1")
     assert "-DSGF_BUILD_TESTS=OFF" in project.stub_log()
-    assert re.search(rf"--target {PROGRAMS}$", project.stub_log(), re.MULTILINE)
+    assert re.search(rf"--target {PROGRAMS} {MRPT_PROGRAMS}$", project.stub_log(), re.MULTILINE)
     project.run("test")
     project.log.unlink()
     project.run("--only", "table1")
     assert "-DSGF_BUILD_TESTS=ON" in project.stub_log()
+
+
+def test_without_mrpt_its_programs_are_not_asked_for_and_that_is_said(project):
+    code, output = project.run("--only", "scenes", "mrpt_map", STUB_NO_MRPT="1")
+    assert code == 0, output
+    assert re.search(rf"--target {PROGRAMS}$", project.stub_log(), re.MULTILINE)
+    log = project.results / "logs" / "configure.log"
+    assert f"the MRPT module and what it shows are left out; why: {log}" in output and log.exists()
+    assert "mrpt_map       left out: the MRPT module is not part of the build" in output
+    assert "scenes         made" in output
+    code, output = project.run("--only", "mrpt_map", STUB_NO_MRPT="1")
+    assert code == 1 and "(mrpt_map: the MRPT module is not part of the build)" in output
 
 
 def test_clean_keeps_the_reference_and_the_sources(project):

@@ -13,7 +13,8 @@ COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_co
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 ODOMETRY = ["odometry", "odometry_parts"]
-RENDERED = ["convergence", "fig1", "fig2", "fig3", *ODOMETRY, "scenes", "sequences"]  # these need no data set
+# These need no data set.
+RENDERED = ["convergence", "fig1", "fig2", "fig3", "mrpt_map", *ODOMETRY, "scenes", "sequences"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -24,7 +25,7 @@ FILES = {
     ]
     + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
-    + ["convergence.csv", "convergence.md"]
+    + ["convergence.csv", "convergence.md", "mrpt_map.csv", "mrpt_map.md"]
     + [f"{name}{end}" for name in ODOMETRY for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
@@ -63,6 +64,7 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     assert "V1_03_difficult, light, median ATE mm: sgf 1.0, photo inf (1/1 lost)" in summary
     assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
     assert "checked, kept, median / 90th percentile of depth errors: sad 60 %, 1.0 / 20.0 cm" in summary
+    assert "V1_02_medium: 10 of 10 frames with pose, 2 key-frames, 3 points, ATE RMSE 1.0 mm" in summary
     assert "sequences      made        figures/sequences.png (.pdf), tables/sequences.md" in summary
     assert "Data sets absent: middlebury2014_h (https://" in summary
 
@@ -216,7 +218,7 @@ def test_what_has_no_data_is_left_out_and_said(project):
     remove_debian_pairs(project)
     code, output = project.run("--only", "table1", "fig4")
     assert code == 1
-    assert "Error: no pair is installed" in output and "no data set at hand" in output
+    assert "Error: no pair is installed" in output and "(table1: its data are not at hand; fig4:" in output
     project.add_dataset("kitti2015", ["000000", "000001"])
     code, output = project.run("--only", "table1", "table2", "bench_stereo", "--data", str(project.data))
     assert code == 0, output
@@ -257,7 +259,7 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
     "command, log, lost",
     [
         ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
-        ("sequence", "sequences_run.log", [*ODOMETRY, "sequences"]),
+        ("sequence", "sequences_run.log", ["mrpt_map", *ODOMETRY, "sequences"]),
     ],
 )
 def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):
@@ -290,6 +292,21 @@ def test_a_changed_recipe_is_rendered_anew(project):
     assert "scenes         made" in output and "sequences      up to date" in output
     renderings = project.renderings()
     assert renderings.count("pair") == renderings.count("sequence") == 2
+
+
+def test_a_downloaded_sequence_joins_the_rendered_one(project):
+    assert project.run("--only", "mrpt_map")[0] == 0
+    raw = project.results / "raw" / "mrpt_map"
+    before = (raw / "V1_02_medium" / "map.tum").stat().st_mtime_ns
+    rendered = project.root / "datasets" / "generated" / "sequences" / "MH_01_easy"
+    shutil.copytree(rendered, project.data / "euroc" / "MH_01_easy")
+    (project.data / "euroc" / "MH_01_easy" / "mav0" / "cam0" / "data.csv").touch()
+    code, output = project.run("--only", "mrpt_map", "--data", str(project.data))
+    assert code == 0, output
+    table = rows(project.results / "tables" / "mrpt_map.csv")
+    assert [row["sequence"] for row in table] == ["V1_02_medium", "euroc_MH_01"]
+    assert (raw / "V1_02_medium" / "map.tum").stat().st_mtime_ns == before
+    assert not list((raw / "euroc_MH_01").glob("in*")), "the rawlog holds a copy of every image"
 
 
 def test_downloaded_frames_join_the_generated_ones(project):

@@ -70,7 +70,8 @@ def test_part_of_a_sequence(sequence, tmp_path):
 def test_a_missing_eye_is_skipped_and_counted(sequence, tmp_path):
     (sequence / "image_1" / "000003.png").unlink()
     out = tmp_path / "out"
-    assert run("sgf_align", sequence, "-o", out).returncode == 0
+    result = run("sgf_align", sequence, "-o", out)
+    assert result.returncode == 0 and "left out: 1 x frame with a missing file" in result.stdout
     summary = json.loads((out / "summary.json").read_text())
     assert summary["skipped"] == 1 and summary["posed"] == FRAMES - 1
 
@@ -96,6 +97,21 @@ def test_the_table_of_residuals():
 )
 def test_bad_arguments(sequence, tmp_path, arguments, message):
     fails(run("sgf_align", sequence, "-o", tmp_path / "out", *arguments), message)
+
+
+def test_an_image_of_another_size_is_named(sequence, tmp_path):
+    image = sequence / "image_1" / "000002.png"
+    Image.open(image).resize((100, 80)).save(image)
+    result = run("sgf_align", sequence, "-o", tmp_path / "out")
+    fails(result, f"{image}: has 100x80 px, the camera 320x200")
+
+
+def test_a_folder_that_cannot_be_made_is_named_before_the_work(sequence, tmp_path):
+    (tmp_path / "file").touch()
+    out = tmp_path / "file" / "out"
+    result = run("sgf_align", sequence, "-o", out)
+    fails(result, f"{out}: cannot be made")
+    assert "frames" not in result.stdout
 
 
 def test_a_broken_image_is_named(sequence, tmp_path):

@@ -35,7 +35,7 @@ class CImageStore
 	CImageStore(const fs::path& rawlog, bool embed) : m_embed(embed)
 	{
 		m_folder = rawlog.parent_path() / (rawlog.stem().string() + "_Images");
-		if (!embed) fs::create_directories(m_folder);
+		if (!embed) fs::create_directory(m_folder);
 	}
 
 	void take(CImage& image, const std::string& name) const
@@ -89,8 +89,8 @@ void convert(
 	const TDatasetOptions& options, bool embed)
 {
 	const auto source = openDataset(folder, options);
-	const CImageStore store(rawlog, embed);
 	CRawlogWriter writer(rawlog);
+	const CImageStore store(rawlog, embed);
 	size_t frames = 0, samples = 0;
 	while (const auto obs = source->next())
 	{
@@ -102,6 +102,7 @@ void convert(
 	std::printf(
 		"%s: %zu frames, %zu inertial samples\n", rawlog.c_str(), frames,
 		samples);
+	reportIncomplete(*source);
 }
 
 }  // namespace

@@ -12,6 +12,10 @@
 
 #include <sgf/apps/cli.h>
 
+#include <mrpt/sgf/CObservationSource.h>
+
+#include <cstdio>
+
 #include "../src/messageOf.h"
 
 namespace mrpt::sgf::apps
@@ -35,6 +39,13 @@ inline int runTool(
 				throw ::sgf::Error("", internal::messageOf(e));
 			}
 		});
+}
+
+/** Prints how many frames the source has left out, if any. */
+inline void reportIncomplete(const CObservationSource& source)
+{
+	if (const size_t count = source.incompleteFrames())
+		std::printf("left out: %zu x frame with a missing file\n", count);
 }
 
 }  // namespace mrpt::sgf::apps

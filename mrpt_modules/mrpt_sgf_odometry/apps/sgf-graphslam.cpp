@@ -22,6 +22,7 @@
 
 #include <iostream>
 
+#include "../src/parameters.h"
 #include "runTool.h"
 
 namespace mrpt::sgf::apps
@@ -55,6 +56,11 @@ mrpt::poses::CPose3DInterpolator optimized(
 
 void run(const TArguments& arguments)
 {
+	for (const auto section :
+		 {"NodeRegistrationDeciderParameters",
+		  "EdgeRegistrationDeciderParameters"})
+		internal::requireSection(
+			mrpt::config::CConfigFile(arguments.config), section);
 	const auto source = openObservations(arguments.input);
 	CSgfOdometryNRD<TGraph> nodes;
 	CSgfLoopClosureERD<TGraph> loops;
@@ -74,6 +80,10 @@ void run(const TArguments& arguments)
 	}
 	TGraph graph = engine.getGraph();
 	std::cout << nodes.odometry().report();
+	reportIncomplete(*source);
+	if (nodes.nodeTimes().empty())
+		THROW_EXCEPTION_FMT(
+			"%s: no frame could be used", arguments.input.c_str());
 	if (graph.nodeCount() == 0)
 		THROW_EXCEPTION_FMT(
 			"%s: the robot has not moved far enough for a node",

@@ -118,6 +118,7 @@ void writeMaps(const CSgfOdometry& odometry, const std::string& prefix)
 		odometry.map().saveToFile(prefix + ".simplemap"),
 		prefix + ".simplemap");
 	writeScene(odometry, points, prefix + ".3Dscene");
+	require(points.saveToPlyFile(prefix + ".ply", true), prefix + ".ply");
 	require(topView(points, path).saveToFile(prefix + ".png"), prefix + ".png");
 	saveTrajectoryTUM(odometry.trajectory(), prefix + ".tum");
 }
@@ -126,6 +127,12 @@ struct TArguments
 {
 	std::string input, prefix, config, section = "SgfOdometry";
 };
+
+std::string ofSensor(const CSgfOdometry::TParams& params)
+{
+	if (params.sensor_label.empty()) return "";
+	return " of sensor " + params.sensor_label;
+}
 
 void run(const TArguments& arguments)
 {
@@ -144,10 +151,11 @@ void run(const TArguments& arguments)
 			logs.take(*result);
 		}
 	std::cout << odometry.report();
+	reportIncomplete(*source);
 	if (frames == 0)
 		THROW_EXCEPTION_FMT(
-			"%s: has no stereo images and no range scans",
-			arguments.input.c_str());
+			"%s: has no stereo images and no range scans%s",
+			arguments.input.c_str(), ofSensor(odometry.params).c_str());
 	if (odometry.trajectory().empty())
 		THROW_EXCEPTION_FMT(
 			"%s: no frame could be used", arguments.input.c_str());
@@ -163,8 +171,8 @@ int main(int argc, char** argv)
 {
 	CLI::App app(
 		"Visual odometry on a rawlog or a data set. Writes PREFIX_obs.rawlog, "
-		"PREFIX_actsf.rawlog, PREFIX.simplemap, PREFIX.3Dscene, PREFIX.png and "
-		"PREFIX.tum",
+		"PREFIX_actsf.rawlog, PREFIX.simplemap, PREFIX.3Dscene, PREFIX.ply, "
+		"PREFIX.png and PREFIX.tum",
 		"sgf-odometry-cli");
 	mrpt::sgf::apps::TArguments a;
 	app.add_option("-i,--input", a.input, "rawlog, or folder of a data set")

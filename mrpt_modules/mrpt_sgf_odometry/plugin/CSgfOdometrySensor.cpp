@@ -13,6 +13,8 @@
 #include <deque>
 #include <set>
 
+#include "../src/nextOrEnd.h"
+
 namespace mrpt::sgf
 {
 IMPLEMENTS_GENERIC_SENSOR(CSgfOdometrySensor, mrpt::sgf)
@@ -101,7 +103,7 @@ void CSgfOdometrySensor::doProcess()
 {
 	ASSERTMSG_(m_source, "initialize() has not been called");
 	if (m_ended) return;
-	while (const auto obs = m_source->next())
+	while (const auto obs = internal::nextOrEnd(*m_source, m_odometry))
 	{
 		if (m_emitSource) appendObservation(obs);
 		m_lastTime = std::max(m_lastTime, obs->timestamp);

@@ -7,6 +7,8 @@
 #include <mrpt/core/exceptions.h>
 #include <mrpt/sgf/DataSourceSgfOdometry.h>
 
+#include "nextOrEnd.h"
+
 namespace mrpt::sgf
 {
 bool DataSourceSgfOdometry::impl_get_next_observations(
@@ -17,7 +19,7 @@ bool DataSourceSgfOdometry::impl_get_next_observations(
 	ASSERTMSG_(source, "DataSourceSgfOdometry::source is not set");
 	observation.reset();
 	auto others = mrpt::obs::CSensoryFrame::Create();
-	while (const auto obs = source->next())
+	while (const auto obs = internal::nextOrEnd(*source, odometry))
 	{
 		const auto result = odometry.processObservation(*obs);
 		if (!result)

@@ -102,6 +102,11 @@ class CDatasetSource : public CObservationSource
 		return m_sequence.stereo() ? stereo(frame) : withDepth(frame);
 	}
 
+	size_t incompleteFrames() const override
+	{
+		return m_sequence.skipped_frames;
+	}
+
  private:
 	CObservation::Ptr inertial(const ::sgf::ImuSample& sample) const
 	{

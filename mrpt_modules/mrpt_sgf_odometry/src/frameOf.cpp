@@ -145,8 +145,21 @@ bool CFrameMaker::TCalibration::operator==(const TCalibration& o) const
 		   secondOnFirst == o.secondOnFirst;
 }
 
+void CFrameMaker::TCalibration::check() const
+{
+	checkedCamera(first);
+	checkedCamera(second);
+	for (const auto& pose : {onRobot, secondOnFirst})
+		if (!pose.getHomogeneousMatrixVal<mrpt::math::CMatrixDouble44>()
+				 .asEigen()
+				 .allFinite())
+			throw Skipped(
+				TSkipReason::NO_CALIBRATION, "pose of a camera is not finite");
+}
+
 bool CFrameMaker::isNew(const TCalibration& calibration) const
 {
+	if (!m_calibration) calibration.check();
 	if (m_calibration && !(*m_calibration == calibration))
 		throw Skipped(
 			TSkipReason::CALIBRATION_CHANGED,

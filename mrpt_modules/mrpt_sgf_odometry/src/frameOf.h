@@ -65,6 +65,7 @@ class CFrameMaker
 		mrpt::poses::CPose3D onRobot, secondOnFirst;
 
 		bool operator==(const TCalibration& o) const;
+		void check() const;  // throws Skipped
 	};
 	bool isNew(const TCalibration& calibration) const;
 	void setUp(const mrpt::obs::CObservationStereoImages& obs);

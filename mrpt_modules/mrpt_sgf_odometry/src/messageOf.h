@@ -11,14 +11,20 @@
 
 namespace mrpt::sgf::internal
 {
-/** What an exception says, without the call stack that MRPT puts around it. */
+/** What an exception says, in one line, without the heading and the call stack
+ * that MRPT puts around it. */
 inline std::string messageOf(const std::exception& e)
 {
 	const std::string text = e.what();
 	const std::string kBegin = "Message:";
 	const auto at = text.find(kBegin);
-	if (at == std::string::npos) return text;
-	const auto begin = text.find_first_not_of(" \n", at + kBegin.size());
+	size_t begin = 0;
+	if (at != std::string::npos)
+		begin = at + kBegin.size();
+	else if (text.rfind("====", 0) == 0)
+		begin = text.find('\n');
+	begin = text.find_first_not_of(" \n", begin);
+	if (begin == std::string::npos) return text;
 	return text.substr(begin, text.find('\n', begin) - begin);
 }
 

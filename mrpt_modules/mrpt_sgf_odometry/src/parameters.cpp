@@ -41,6 +41,20 @@ void requirePositive(const char* name, double value, const std::string& where)
 			where, mrpt::format("%s is %g, has to be positive", name, value));
 }
 
+// The odometry checks its options when it is made: so one is made, for any
+// camera.
+void checkOdometryOptions(
+	const ::sgf::odometry::OdometryOptions& options, const std::string& where)
+try
+{
+	const ::sgf::Camera camera{640, 480, 500, 500, 319.5, 239.5};
+	const ::sgf::odometry::Odometry odometry({camera, 0.1}, options);
+}
+catch (const ::sgf::Error& e)
+{
+	throw ::sgf::Error(where, e.what());
+}
+
 }  // namespace
 
 void internal::requireSection(
@@ -75,7 +89,8 @@ void CSgfOdometry::TParams::loadFromSharedSection(
 	const std::set<std::string>& others)
 {
 	internal::requireSection(source, section);
-	const std::string where = "[" + section + "]";
+	// Not in brackets, which MRPT takes for a place in the code.
+	const std::string where = "section " + section;
 	TOwnFields own{*this};
 	const auto fields = ::sgf::DescribeOptions(own);
 	std::vector<std::string> keys;
@@ -94,7 +109,7 @@ void CSgfOdometry::TParams::loadFromSharedSection(
 			odometry[key] = value;
 	}
 	::sgf::ReadOptions(ownValues, own, where);
-	internal::odometryOptions(*this, where);  // throws for what is unknown
+	checkOdometryOptions(internal::odometryOptions(*this, where), where);
 	requirePositive("max_gap_s", max_gap_s, where);
 	requirePositive("lost_std_xyz_m", lost_std_xyz_m, where);
 	requirePositive("lost_std_angle_deg", lost_std_angle_deg, where);

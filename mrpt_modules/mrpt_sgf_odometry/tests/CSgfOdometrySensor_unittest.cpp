@@ -99,6 +99,27 @@ TEST(CSgfOdometrySensor, EmitsStockObservations)
 	EXPECT_TRUE(sensor->getObservations().empty());
 }
 
+TEST(CSgfOdometrySensor, ARawlogThatIsCutOffGivesItsPosesAndTheReport)
+{
+	const ::sgf::TempDir dir;
+	const auto file = writeDrive(dir.path());
+	std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+	const auto sensor = makeSensor("path = " + file);
+	sensor->initialize();
+	CGenericSensor::TListObservations all;
+	for (int i = 0; i <= kFrames; ++i)
+	{
+		EXPECT_NO_THROW(sensor->doProcess());
+		all.merge(sensor->getObservations());
+	}
+	size_t poses = 0;
+	for (const auto& [time, object] : all)
+		poses += IS_CLASS(*object, CObservationRobotPose);
+	EXPECT_GE(poses, 1U);
+	EXPECT_LT(poses, size_t(kFrames));
+	EXPECT_TRUE(IS_CLASS(*all.rbegin()->second, CObservationComment));
+}
+
 TEST(CSgfOdometrySensor, TakesImagesFromACameraSensor)
 {
 	const ::sgf::TempDir dir;
@@ -133,7 +154,9 @@ TEST(CSgfOdometrySensor, ParametersAreInItsSection)
 TEST(CSgfOdometrySensor, BadSectionsAreNamed)
 {
 	EXPECT_NE(
-		errorOf("path = x.rawlog\npaht = y").find("paht"), std::string::npos);
+		errorOf("path = x.rawlog\npaht = y")
+			.find("section S: unknown key 'paht'"),
+		std::string::npos);
 	EXPECT_NE(errorOf("").find("camera_config"), std::string::npos);
 	EXPECT_NE(
 		errorOf("path = /nonexistent/x.rawlog").find("x.rawlog"),

@@ -220,6 +220,12 @@ TEST(CSgfOdometry, NoCalibration)
 	auto obs = CRoom::stereo({}, 1);
 	obs->leftCamera.setIntrinsicParamsFromValues(0, 0, 0, 0);
 	EXPECT_EQ(odometry.process(*obs).skipped, TSkipReason::NO_CALIBRATION);
+	obs = CRoom::stereo({}, 1);
+	obs->leftCamera = obs->rightCamera = {};  // of another size than the images
+	EXPECT_EQ(odometry.process(*obs).skipped, TSkipReason::NO_CALIBRATION);
+	obs = CRoom::stereo({}, 2);
+	obs->cameraPose.x(NAN);
+	EXPECT_EQ(odometry.process(*obs).skipped, TSkipReason::NO_CALIBRATION);
 	obs = CRoom::stereo({}, 2);
 	obs->rightCameraPose = {};
 	EXPECT_EQ(odometry.process(*obs).skipped, TSkipReason::NO_CALIBRATION);
@@ -228,6 +234,15 @@ TEST(CSgfOdometry, NoCalibration)
 	EXPECT_EQ(
 		odometry.process(*obs).skipped, TSkipReason::UNSUPPORTED_CALIBRATION);
 	EXPECT_TRUE(odometry.process(*CRoom::stereo({}, 4)).pose);
+}
+
+TEST(CSgfOdometry, PoseOfTheDepthSensorNotFinite)
+{
+	CSgfOdometry odometry = quiet();
+	auto obs = CRoom::withDepth({}, 1);
+	obs->sensorPose.x(NAN);
+	EXPECT_EQ(odometry.process(*obs).skipped, TSkipReason::NO_CALIBRATION);
+	EXPECT_TRUE(odometry.process(*CRoom::withDepth({}, 2)).pose);
 }
 
 TEST(CSgfOdometry, DepthNotToBeUsed)
@@ -412,5 +427,8 @@ TEST(CSgfOdometryParams, WhatIsWrongIsNamed)
 	EXPECT_TRUE(names("[O]\nuse_imu = maybe\n", "maybe"));
 	EXPECT_TRUE(names("[O]\nalignment.residul = sgf\n", "residul"));
 	EXPECT_TRUE(names("[O]\nmax_gap_s = -1\n", "max_gap_s"));
+	EXPECT_TRUE(
+		names("[O]\nalignment.residual = sfg\n", "section O: residual"));
+	EXPECT_TRUE(names("[O]\nmin_depth_m = 200\n", "section O: min_depth_m"));
 	EXPECT_TRUE(names("[P]\n", "[O]"));
 }

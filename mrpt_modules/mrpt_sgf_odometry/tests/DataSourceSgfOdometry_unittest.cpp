@@ -25,10 +25,14 @@ namespace
 class CDrive : public CObservationSource
 {
  public:
-	explicit CDrive(int frames) : m_frames(frames) {}
+	explicit CDrive(int frames, bool cutOff = false)
+		: m_frames(frames), m_cutOff(cutOff)
+	{
+	}
 
 	CObservation::Ptr next() override
 	{
+		if (m_next == m_frames && m_cutOff) throw std::runtime_error("cut off");
 		if (m_next == m_frames) return {};
 		auto obs = CRoom::stereo(CRoom::pose(m_next), CRoom::time(m_next));
 		obs->hasImageRight = m_next != 3;
@@ -38,6 +42,7 @@ class CDrive : public CObservationSource
 
  private:
 	int m_frames, m_next = 0;
+	bool m_cutOff;
 };
 
 class CApp : public mrpt::apps::RBPF_SLAM_App_Base, public DataSourceSgfOdometry
@@ -96,6 +101,23 @@ TEST(DataSourceSgfOdometry, GivesActionsWithFrames)
 	}
 	EXPECT_EQ(steps, 4);  // the first frame has no increment, one no right eye
 	EXPECT_LT((sum - CRoom::pose(5)).norm(), 0.01);
+}
+
+TEST(DataSourceSgfOdometry, ASourceThatIsCutOffEnds)
+{
+	CApp app;
+	app.source = std::make_unique<CDrive>(2, true);
+	app.odometry.setMinLoggingLevel(mrpt::system::LVL_ERROR);
+	app.odometry.logging_enable_console_output = false;
+	app.odometry.logging_enable_keep_record = true;
+	mrpt::obs::CActionCollection::Ptr action;
+	mrpt::obs::CSensoryFrame::Ptr frame;
+	CObservation::Ptr none;
+	EXPECT_TRUE(app.impl_get_next_observations(action, frame, none));
+	EXPECT_FALSE(app.impl_get_next_observations(action, frame, none));
+	EXPECT_NE(
+		app.odometry.getLogAsString().find("Ends early: cut off"),
+		std::string::npos);
 }
 
 TEST(DataSourceSgfOdometry, NoSourceIsAnError)

@@ -38,7 +38,7 @@ def fails(name, *arguments, parts):
     """Bad input: exit code 2 and one line on stderr that has all the parts."""
     result = run(BUILD / "bin" / name, *arguments)
     assert result.returncode == 2, result.stdout + result.stderr
-    error = result.stderr.strip().splitlines()[-1]
+    (error,) = result.stderr.strip().splitlines()
     assert all(str(part) in error for part in parts), error
 
 
@@ -93,7 +93,7 @@ def test_every_frame_has_a_pose_and_every_file_is_there(drive):
     assert len(drive.poses) == drive.frames
     assert f"frames: {drive.frames}, with pose: {drive.frames}, lost: 0" in drive.report
     assert "skipped" not in drive.report
-    for ending in ("_obs.rawlog", "_actsf.rawlog", ".simplemap", ".3Dscene", ".png", ".tum"):
+    for ending in ("_obs.rawlog", "_actsf.rawlog", ".simplemap", ".3Dscene", ".ply", ".png", ".tum"):
         assert drive.file(ending).stat().st_size > 0
     assert max(Image.open(drive.file(".png")).size) == 1001
     assert not list(drive.folder.glob("*.part"))
@@ -182,7 +182,7 @@ def test_rawlog_grabber_writes_our_poses_and_needs_the_plug_in_for_it(drive, tmp
 def test_rawlog_grabber_names_an_unknown_key(tmp_path):
     config = edited_ini("rawlog-grabber.ini", tmp_path / "grab.ini", rawlog_prefix=tmp_path / "out")
     config.write_text(config.read_text().replace("max_gap_s", "max_gap"))
-    assert "max_gap" in grab(config, "-p", PLUGIN)
+    assert "section SGF: unknown key 'max_gap'" in grab(config, "-p", PLUGIN)
 
 
 def test_rbpf_slam_ends_its_odometry_path_at_our_pose(drive, tmp_path):
@@ -275,13 +275,8 @@ def test_graphslam_engine_has_our_vertices_and_our_covariance(drive, tmp_path):
 
 
 def test_observations2map_rebuilds_the_map(drive, tmp_path):
-    config = tmp_path / "metric.ini"
-    config.write_text(
-        "[M]\npointsMap_count = 1\noctoMap_count = 1\n"
-        "[M_pointsMap_00_insertOpts]\nminDistBetweenLaserPoints = 0\n"
-        "[M_octoMap_00_creationOpts]\nresolution = 0.1\n"
-    )
-    result = run("observations2map", config, drive.file(".simplemap"), tmp_path / "map", "-s", "M",
+    config = MODULE / "config" / "observations2map.ini"
+    result = run("observations2map", config, drive.file(".simplemap"), tmp_path / "map", "-s", "Map",
                  stdin=subprocess.DEVNULL)
     assert result.returncode == 0, result.stdout + result.stderr
     (tree,) = tmp_path.glob("map*.bt")
@@ -366,6 +361,16 @@ def test_missing_images_are_skipped_and_counted(tmp_path):
     assert not list(tmp_path.glob("none*"))
 
 
+def test_frames_with_a_missing_file_are_left_out_and_counted(tmp_path):
+    dataset = room.write_euroc(tmp_path / "room", room.curve(4))
+    sorted((dataset / "mav0" / "cam1" / "data").iterdir())[1].unlink()
+    rawlog = tmp_path / "in.rawlog"
+    said = "left out: 1 x frame with a missing file"
+    assert said in tool("dataset2rawlog", "-i", dataset, "-o", rawlog)
+    assert said in tool("sgf-odometry-cli", "-i", dataset, "-o", tmp_path / "out")
+    assert "left out" not in tool("sgf-odometry-cli", "-i", rawlog, "-o", tmp_path / "out")
+
+
 def test_bad_input_is_named(tmp_path):
     missing = tmp_path / "missing.rawlog"
     out = tmp_path / "out"
@@ -374,6 +379,10 @@ def test_bad_input_is_named(tmp_path):
     noise.write_bytes(b"no rawlog at all")
     fails("sgf-odometry-cli", "-i", noise, "-o", out, parts=[noise])
     fails("dataset2rawlog", "-i", tmp_path, "-o", out, parts=[tmp_path])
+    nowhere = tmp_path / "no" / "out.rawlog"
+    dataset = room.write_euroc(tmp_path / "room", room.curve(2))
+    fails("dataset2rawlog", "-i", dataset, "-o", nowhere, parts=[nowhere, "cannot be written"])
+    assert not nowhere.parent.exists()
     fails("dataset2rawlog", "-i", tmp_path, "-o", out, "-l", "kiti", parts=["kiti", "kitti"])
     assert not list(tmp_path.glob("out*"))
 
@@ -384,9 +393,34 @@ def test_bad_configurations_are_named(tmp_path):
     arguments = ["-i", dataset, "-o", tmp_path / "out", "-c", config]
     fails("sgf-odometry-cli", *arguments, parts=["SgfOdometry", "maybe"])
     fails("sgf-odometry-cli", *arguments, "-s", "Other", parts=["Other"])
-    config.write_text("[SgfOdometry]\nuse_imo = true\n")
-    fails("sgf-odometry-cli", *arguments, parts=["SgfOdometry", "use_imo"])
+    for line, part in {
+        "use_imo = true": "unknown key 'use_imo'",
+        "alignment.residual = sfg": "residual: 'sfg' is unknown",
+    }.items():
+        config.write_text(f"[SgfOdometry]\n{line}\n")
+        fails("sgf-odometry-cli", *arguments, parts=["section SgfOdometry", part])
+    config.write_text("[SgfOdometry]\nsensor_label = OTHER\n")
+    fails("sgf-odometry-cli", *arguments, parts=[dataset, "no stereo images", "of sensor OTHER"])
+    config.write_text("[SgfOdometry]\nuse_imu = ${NOTHING}\n")
+    fails("sgf-odometry-cli", *arguments, parts=["NOTHING"])
     tool("sgf-odometry-cli", *arguments[:4], "-c", MODULE / "config" / "sgf-odometry.ini")
+
+
+def test_graph_slam_names_what_is_wrong(tmp_path):
+    sample = (MODULE / "config" / "sgf-graphslam.ini").read_text()
+    config = tmp_path / "graph.ini"
+    dataset = room.write_euroc(tmp_path / "room", room.curve(2))
+    arguments = ["-i", dataset, "-o", tmp_path / "out", "-c", config]
+    for change, parts in {
+        ("lc_candidates", "lc_candidate"): ["EdgeRegistrationDeciderParameters", "'lc_candidate'"],
+        ("max_gap_s", "max_gap"): ["section SgfOdometry", "'max_gap'"],
+        ("[NodeRegistration", "[Node"): ["NodeRegistrationDeciderParameters"],
+        ("max_gap_s = 1.0", "sensor_label = OTHER"): [dataset, "no frame could be used"],
+        ("", ""): [dataset, "not moved far enough"],
+    }.items():
+        config.write_text(sample.replace(*change) if change[0] else sample)
+        fails("sgf-graphslam", *arguments, parts=parts)
+    assert not list(tmp_path.glob("out*"))
 
 
 # --- the installed package -------------------------------------------------------------------------

@@ -4,8 +4,9 @@
 
 #include <iostream>
 
-int main(int, char** argv)
+int main(int argc, char** argv)
 {
+	if (argc != 2) return 2;  // expected: a rawlog, or a folder
 	mrpt::sgf::CSgfOdometry odometry;
 	const auto source = mrpt::sgf::openObservations(argv[1]);
 	while (const auto obs = source->next())

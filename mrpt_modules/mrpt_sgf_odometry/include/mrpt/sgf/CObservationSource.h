@@ -23,6 +23,9 @@ class CObservationSource
 	/** The next observation, or an empty pointer at the end.
 	 * \exception std::exception if the rest cannot be read */
 	virtual mrpt::obs::CObservation::Ptr next() = 0;
+
+	/** Frames that are left out since one of their files is missing */
+	virtual size_t incompleteFrames() const { return 0; }
 };
 
 /** Observations of a rawlog of either format. Its external images are looked

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <mrpt/config/CConfigFile.h>
+#include <mrpt/core/exceptions.h>
 #include <mrpt/graphslam/interfaces/CEdgeRegistrationDecider.h>
 #include <mrpt/sgf/CSgfOdometryNRD.h>
 #include <mrpt/sgf/CSgfPairAligner.h>
@@ -16,6 +17,8 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 namespace mrpt::sgf
@@ -52,7 +55,8 @@ class CSgfLoopClosureERD
 
 	CSgfLoopClosureERD() { this->initializeLoggers("CSgfLoopClosureERD"); }
 
-	/** \exception std::exception as CSgfOdometry::TParams does */
+	/** \exception std::exception as CSgfOdometry::TParams does, and for a key
+	 * "lc_..." that is not known */
 	void loadParams(const std::string& source_fname) override
 	{
 		parent_t::loadParams(source_fname);
@@ -102,6 +106,7 @@ class CSgfLoopClosureERD
 
 		void load(const mrpt::config::CConfigFileBase& c, const std::string& s)
 		{
+			requireKnown(c, s);
 			const auto angle = [&](const char* key, double now) {
 				return mrpt::DEG2RAD(c.read_double(s, key, mrpt::RAD2DEG(now)));
 			};
@@ -115,6 +120,24 @@ class CSgfLoopClosureERD
 				c.read_double(s, "lc_max_disagreement_m", maxDisagreement);
 			maxDisagreementAngle =
 				angle("lc_max_disagreement_deg", maxDisagreementAngle);
+		}
+
+	 private:
+		// MRPT's own keys in the section have other names.
+		static void requireKnown(
+			const mrpt::config::CConfigFileBase& c, const std::string& s)
+		{
+			static const std::set<std::string> kKnown = {
+				"lc_min_nodes_apart",     "lc_max_distance",
+				"lc_max_angle",           "lc_candidates",
+				"lc_min_inliers",         "lc_max_disagreement_m",
+				"lc_max_disagreement_deg"};
+			std::vector<std::string> keys;
+			c.getAllKeys(s, keys);
+			for (const auto& key : keys)
+				if (key.rfind("lc_", 0) == 0 && !kKnown.count(key))
+					THROW_EXCEPTION_FMT(
+						"section %s: unknown key '%s'", s.c_str(), key.c_str());
 		}
 	};
 	TParams params;

@@ -50,8 +50,8 @@ class CSgfOdometrySensor : public mrpt::hwdrivers::CGenericSensor
 	void initialize() override;
 
 	/** Processes the observations up to the next frame. At the end of the
-	 * source it does nothing.
-	 * \exception std::exception if the source cannot be read any further */
+	 * source it does nothing. A source that cannot be read any further has
+	 * come to its end, and the log says why. */
 	void doProcess() override;
 
 	/** Whether the source has come to its end; never so for a camera. */

@@ -38,9 +38,9 @@ class DataSourceSgfOdometry : virtual public mrpt::apps::BaseAppDataSource
 	CSgfOdometry odometry;
 
  protected:
-	/** \return false at the source's end
-	 * \exception std::exception if there is no source, or as
-	 * CObservationSource::next() */
+	/** \return false at the source's end. A source that cannot be read any
+	 * further has come to its end, and the log says why.
+	 * \exception std::exception if there is no source */
 	bool impl_get_next_observations(
 		mrpt::obs::CActionCollection::Ptr& action,
 		mrpt::obs::CSensoryFrame::Ptr& observations,
