@@ -7,7 +7,7 @@
 #include <fmt/core.h>
 
 #include <sgf/alignment/patch_alignment.h>
-#include <sgf/alignment/residual_table.h>
+#include <sgf/apps/as_extracted.h>
 #include <sgf/apps/cli.h>
 #include <sgf/apps/convergence.h>
 #include <sgf/apps/image_change.h>
@@ -66,7 +66,7 @@ struct Column {
 
   template <class V>
   void VisitFields(V&& visit) {
-    visit("residual", residual, "", "a name of the table of residuals");
+    visit("residual", residual, "", "a name of the table of residuals, or one of as_extracted.h");
     visit("epsilon", epsilon, "", "normalisation of gradients, eq. 6");
     visit("compared", compared, "", "its converged tracks bound the common set");
   }
@@ -129,7 +129,7 @@ constexpr bool kTrackable =
     std::is_same_v<typename Residual::Channels, SampleChannels>&& Residual::kExtraParameters == 0;
 
 void CheckColumn(const Column& column, const std::string& file) {
-  const bool trackable = alignment::VisitResidual(column.residual, [](const auto& residual) {
+  const bool trackable = VisitStudiedResidual(column.residual, [](const auto& residual) {
     return kTrackable<std::remove_cvref_t<decltype(residual)>>;
   });
   Require(trackable, file,
@@ -350,7 +350,7 @@ auto VisitMotion(PatchMotion motion, const F& f) {
 std::vector<Errors> TrackColumn(const Column& column, const std::vector<SamplePair>& samples,
                                 const Scene& scene) {
   std::vector<Errors> errors;
-  alignment::VisitResidual(column.residual, [&](const auto& residual) {
+  VisitStudiedResidual(column.residual, [&](const auto& residual) {
     if constexpr (kTrackable<std::remove_cvref_t<decltype(residual)>>)
       VisitMotion(scene.run.motion, [&](auto warp) {
         for (const Start& start : Starts(scene.run))

@@ -64,4 +64,26 @@ class AnalyticImage {
                                                   {8, -0.37, 0.21, 5.1}}};
 };
 
+/// Stands in for bit-planes: the analytic image at eight offsets.
+class AnalyticPlanes {
+ public:
+  template <class T>
+  bool Inside(const Eigen::Matrix<T, 2, 1>& /*p*/) const {
+    return true;
+  }
+
+  template <class T>
+  ChannelsAt<T, 8> Sample(const Eigen::Matrix<T, 2, 1>& p) const {
+    ChannelsAt<T, 8> at;
+    for (int k = 0; k < 8; ++k) {
+      const ChannelsAt<T, 4> plane =
+          AnalyticImage{}.Sample<T>({p.x() + T(5.0 * k), p.y() - T(3.0 * k)});
+      at.value[k] = plane.value[kIntensity];
+      at.d_x[k] = plane.d_x[kIntensity];
+      at.d_y[k] = plane.d_y[kIntensity];
+    }
+    return at;
+  }
+};
+
 }  // namespace sgf::alignment

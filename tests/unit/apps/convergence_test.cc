@@ -37,6 +37,12 @@ cases:
   pyramid: {levels: 3, start_px: [10]}
 )";
 
+// The study with one thing changed.
+std::string With(const std::string& what, const std::string& by) {
+  std::string study = kStudy;
+  return study.replace(study.find(what), what.size(), by);
+}
+
 // Blobs of a few pixels, at grey levels that an offset of 40 does not clip.
 cv::Mat1b Blobs(cv::Size size, uint64_t seed) {
   cv::Mat1f noise(size);
@@ -132,22 +138,26 @@ TEST_F(ConvergenceTest, ReachesFartherWithAPyramid) {
             Value("plain,translation,1,px,10,photo", "converged") + 15);
 }
 
+TEST_F(ConvergenceTest, TracksWithDerivativesAsExtracted) {
+  ASSERT_EQ(Run(With("photo: {residual: photo", "exact: {residual: sgf3"), 2), "no error");
+  const double exact = Value("plain,translation,1,px,1,exact", "own_median_px");
+  ASSERT_EQ(Run(With("photo: {residual: photo", "as_extracted: {residual: sgf3_as_extracted"), 2),
+            "no error");
+  EXPECT_GT(Value("plain,translation,1,px,1,as_extracted", "own_median_px"), exact);
+}
+
 TEST_F(ConvergenceTest, NamesWhatIsWrong) {
-  const auto with = [](const std::string& what, const std::string& by) {
-    std::string study = kStudy;
-    return study.replace(study.find(what), what.size(), by);
-  };
-  EXPECT_THAT(Run(with("columns:", "colums:"), 1), HasSubstr("expected a map under the key 'col"));
-  EXPECT_THAT(Run(with("points: 60", "pints: 60"), 1), HasSubstr(":3: unknown key 'pints'"));
-  EXPECT_THAT(Run(with("points: 60", "points: 6000"), 1), HasSubstr("case plain: the images have"));
-  EXPECT_THAT(Run(with("residual: ngv", "residual: ngx"), 1), HasSubstr("'ngx' is unknown"));
-  EXPECT_THAT(Run(with("residual: ngv", "residual: bit_planes"), 1),
+  EXPECT_THAT(Run(With("columns:", "colums:"), 1), HasSubstr("expected a map under the key 'col"));
+  EXPECT_THAT(Run(With("points: 60", "pints: 60"), 1), HasSubstr(":3: unknown key 'pints'"));
+  EXPECT_THAT(Run(With("points: 60", "points: 6000"), 1), HasSubstr("case plain: the images have"));
+  EXPECT_THAT(Run(With("residual: ngv", "residual: ngx"), 1), HasSubstr("'ngx' is unknown"));
+  EXPECT_THAT(Run(With("residual: ngv", "residual: bit_planes"), 1),
               HasSubstr("columns.ngv: 'bit_planes' cannot be tracked here"));
-  EXPECT_THAT(Run(with("motion: se2", "motion: translation"), 1),
+  EXPECT_THAT(Run(With("motion: se2", "motion: translation"), 1),
               HasSubstr("cases.roll: start_deg needs motion se2 or similarity"));
-  EXPECT_THAT(Run(with("scale: 1.2", "scale: 0"), 1),
+  EXPECT_THAT(Run(With("scale: 1.2", "scale: 0"), 1),
               HasSubstr("cases.scale: scale must be finite and positive"));
-  EXPECT_THAT(Run(with("start_px: [1, 10]", "start_px: [0]"), 1),
+  EXPECT_THAT(Run(With("start_px: [1, 10]", "start_px: [0]"), 1),
               HasSubstr("cases.plain: starts must be above 0"));
 }
 
