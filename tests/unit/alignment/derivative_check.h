@@ -243,7 +243,8 @@ void ExpectAgreementWithDifferences(const Residual& residual, const Image& image
 template <class Warp>
 void ExpectAgreementOnPicture(const cv::Mat& picture) {
   const SampleChannels samples = MakeSampleChannels(picture, {});
-  const BitPlanes planes = MakeBitPlanes(picture);
+  BitPlanes planes;
+  MakeBitPlanes(picture, planes);
   const Camera camera = CameraFor(picture.cols, picture.rows);
   ForEachResidual([&](const auto& residual) {
     if constexpr (kOfSamples<std::remove_cvref_t<decltype(residual)>>)
