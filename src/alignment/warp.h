@@ -285,4 +285,48 @@ struct EpipolarWarp {
   void Update(const Parameters& delta) { inverse_depth += delta(0); }
 };
 
+/// Both at once: the parameters of Se3Warp, then that of EpipolarWarp.
+template <class T>
+struct Se3DepthWarp {
+  using Scalar = T;
+  static constexpr int kParameters = 7;
+  using Parameters = Eigen::Matrix<T, kParameters, 1>;
+  using Input = PixelAtDepth<T>;  ///< with inverse depths against that of the patch's centre
+
+  struct Point : Se3Warp<T>::Point {
+    Vector3<T> p;
+    Parameters Along(const Vector2<T>& c) const {
+      return Joined(Motion::Along(c), this->BackToX(c).dot(p));
+    }
+    Parameters Turn(const Vector2<T>& w, const Vector2<T>& v) const {
+      const Vector3<T> t = this->d_ux * w.x() + this->d_uy * w.y();
+      return Joined(Motion::Turn(w, v), this->HessianTimes(v, p).dot(t));
+    }
+
+   private:
+    using Motion = typename Se3Warp<T>::Point;
+    static Parameters Joined(const Eigen::Matrix<T, 6, 1>& motion, T depth) {
+      Parameters joined;
+      joined.template head<6>() = motion;
+      joined(6) = depth;
+      return joined;
+    }
+  };
+
+  Se3Warp<T> motion;
+  T inverse_depth;
+
+  Se3DepthWarp(const Camera& camera, const SE3& T_cur_ref, T inverse_depth_in)
+      : motion(camera, T_cur_ref), inverse_depth(inverse_depth_in) {}
+
+  bool At(const Input& u, Point& point) const {
+    point.p = motion.projector.p;
+    return motion.At({u.ray, inverse_depth + u.inverse_depth, u.slope}, point);
+  }
+  void Update(const Eigen::Matrix<double, kParameters, 1>& delta) {
+    motion.Update(delta.head<6>());
+    inverse_depth += static_cast<T>(delta(6));
+  }
+};
+
 }  // namespace sgf::alignment

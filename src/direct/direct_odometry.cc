@@ -1,0 +1,746 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <deque>
+
+#include <fmt/core.h>
+
+#include <sgf/core/error.h>
+#include <sgf/core/parallel.h>
+#include <sgf/direct/direct_odometry.h>
+
+namespace sgf::direct {
+namespace {
+
+using alignment::ReferencePoint;
+using Eigen::Vector2f, Eigen::Vector3d;
+
+class Stopwatch {
+ public:
+  double Lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const std::chrono::duration<double> elapsed = now - start_;
+    start_ = now;
+    return elapsed.count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Where a pixel of known inverse depth is in another camera's image.
+struct Seen {
+  bool in_view = false;
+  Vector2f pixel = Vector2f::Zero();
+  float inverse_depth = 0;
+};
+
+/// Pixels have to be this far inside for a patch to be sampled.
+constexpr float kMargin = 4;  // px
+
+Seen Project(const Camera& camera, const SE3& T_target_host, const Vector2f& pixel,
+             double inverse_depth) {
+  const Eigen::Vector2d ray = alignment::RayOf<double>(camera, pixel.cast<double>());
+  const Vector3d X = T_target_host.R * ray.homogeneous() + inverse_depth * T_target_host.p;
+  if (!(X.z() > 1e-3)) return {};
+  Seen seen;
+  seen.pixel = {static_cast<float>(camera.fx * X.x() / X.z() + camera.cx),
+                static_cast<float>(camera.fy * X.y() / X.z() + camera.cy)};
+  seen.inverse_depth = static_cast<float>(inverse_depth / X.z());
+  seen.in_view = seen.pixel.x() >= kMargin && seen.pixel.y() >= kMargin &&
+                 seen.pixel.x() < camera.width - 1 - kMargin &&
+                 seen.pixel.y() < camera.height - 1 - kMargin;
+  return seen;
+}
+
+bool SeenBy(const ActivePoint& point, int keyframe) {
+  return std::any_of(point.observations.begin(), point.observations.end(),
+                     [&](const Observation& seen) { return seen.target == keyframe; });
+}
+
+/// Cells of an image that already have a point.
+class Occupancy {
+ public:
+  Occupancy(const Camera& camera, double spacing_px)
+      : spacing_(static_cast<float>(spacing_px)),
+        cells_(static_cast<int>(camera.height / spacing_px) + 1,
+               static_cast<int>(camera.width / spacing_px) + 1, uint8_t{0}) {}
+
+  /// @return whether the place was free; it is taken then.
+  bool Take(const Vector2f& pixel) {
+    uint8_t& cell = cells_(static_cast<int>(pixel.y() / spacing_),
+                           static_cast<int>(pixel.x() / spacing_));
+    if (cell) return false;
+    cell = 1;
+    return true;
+  }
+
+ private:
+  float spacing_;
+  cv::Mat1b cells_;
+};
+
+/// Motions that may have happened since the last frame, T_cur_last, the likeliest first.
+std::vector<SE3> Hypotheses(const SE3& motion) {
+  const SE3 none;
+  const SE3 half{ExpSO3(0.5 * LogSO3(motion.R)), 0.5 * motion.p};
+  std::vector<SE3> motions = {motion, none, half, motion * motion};
+  // Turns about all axes and their diagonals, on top of the motion.
+  for (const double angle : {0.02, 0.05})  // rad
+    for (int x = -1; x <= 1; ++x)
+      for (int y = -1; y <= 1; ++y)
+        for (int z = -1; z <= 1; ++z)
+          if (x != 0 || y != 0 || z != 0)
+            motions.push_back(SE3{ExpSO3(angle * Vector3d(x, y, z)), {0, 0, 0}} * motion);
+  return motions;
+}
+
+}  // namespace
+
+void CheckOptions(const DirectOptions& options) {
+  CheckOptions(options.selection);
+  CheckOptions(options.depth);
+  CheckOptions(options.tracking);
+  CheckOptions(options.window);
+  CheckOptions(options.initializer);
+  const auto require = [](bool valid, const char* option, double value, const char* range) {
+    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
+  };
+  if (options.tracking.residual == "bit_planes")
+    throw Error("tracking.residual", "'bit_planes' has no window to go with it");
+  require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
+  require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
+  require(options.keyframes >= options.min_keyframes && options.keyframes <= 30, "keyframes",
+          options.keyframes, "from min_keyframes to 30");
+  require(options.keyframe_flow > 0, "keyframe_flow", options.keyframe_flow, "positive");
+  require(options.keyframe_parallax > 0, "keyframe_parallax", options.keyframe_parallax,
+          "positive");
+  require(options.keyframe_brightness > 0, "keyframe_brightness", options.keyframe_brightness,
+          "positive");
+  require(options.lost_frames >= 1, "lost_frames", options.lost_frames, "positive");
+  require(options.threads >= 0, "threads", options.threads, "at least 0");
+}
+
+class DirectOdometry::Impl {
+ public:
+  Impl(const Camera& camera, const PhotometricCalibration& calibration,
+       const DirectOptions& options)
+      : camera_(camera),
+        options_(WithThreads(options)),
+        correction_(calibration, {camera.width, camera.height}),
+        aligner_(camera, options_.tracking),
+        depth_(MakeDepthEstimator(camera, options.depth)),
+        selector_(options.selection),
+        spacing_px_(std::sqrt(0.5 * camera.width * camera.height / options.active_points)) {
+    CheckOptions(options);
+    BeginMap();
+  }
+
+  DirectFrameResult Process(std::int64_t time_ns, const cv::Mat& grey,
+                            std::optional<double> exposure_ms) {
+    CheckFrame(time_ns, grey, exposure_ms);
+    DirectFrameResult result{.time_ns = time_ns, .segment = segment_};
+    Stopwatch total, stage;
+    const cv::Mat1f image = correction_(grey);
+    log_exposure_ = exposure_ms ? std::log(*exposure_ms / *first_exposure_ms_) : 0;
+    if (!initializer_) {
+      aligner_.MakePyramid(image, pyramid_);
+      result.times.image_s = stage.Lap();
+      Track(result);
+      result.times.tracking_s = stage.Lap();
+    }
+    if (initializer_) {
+      result.state = DirectState::kInitialising;
+      Initialise(time_ns, image, grey, result);
+      result.times.keyframe_s = stage.Lap();
+    } else if (result.state == DirectState::kTracked) {
+      TraceAll();
+      result.times.tracing_s = stage.Lap();
+      if (NeedsKeyframe(result)) MakeKeyframe(result);
+      result.times.keyframe_s = stage.Lap();
+    }
+    if (!window_.empty()) result.T_world_cam = LastPose().Inverse();
+    last_time_ns_ = time_ns;
+    result.segment = segment_;
+    result.active_points = CountActive();
+    result.times.total_s = total.Lap();
+    return result;
+  }
+
+  std::vector<DirectPose> Trajectory() const {
+    std::vector<DirectPose> poses;
+    for (const Record& record : records_)
+      poses.push_back({record.time_ns, record.segment, PoseOf(record).Inverse()});
+    return poses;
+  }
+
+  std::vector<MapPoint> TakeFinishedPoints() { return std::exchange(finished_, {}); }
+
+  std::vector<MapPoint> ActivePoints() const {
+    std::vector<MapPoint> points;
+    for (const auto& frame : window_)
+      for (const ActivePoint& point : frame->points) points.push_back(ToMapPoint(*frame, point));
+    return points;
+  }
+
+ private:
+  /// A frame with a pose, as it lies to a key-frame.
+  struct Record {
+    std::int64_t time_ns = 0;
+    int segment = 0;
+    int keyframe = 0;  ///< id
+    SE3 T_cam_keyframe;
+  };
+
+  /// A frame before there is a map.
+  struct Waiting {
+    std::int64_t time_ns = 0;
+    cv::Mat grey;  ///< 8-bit, as it came
+    double log_exposure = 0;
+  };
+
+  static DirectOptions WithThreads(DirectOptions options) {
+    options.tracking.threads = options.threads;
+    return options;
+  }
+
+  void CheckFrame(std::int64_t time_ns, const cv::Mat& grey, std::optional<double> exposure_ms) {
+    if (grey.type() != CV_8UC1)
+      throw Error("image", fmt::format("is of type {}; it has to be 8-bit grey",
+                                       cv::typeToString(grey.type())));
+    if (grey.cols != camera_.width || grey.rows != camera_.height)
+      throw Error("image", fmt::format("is {}x{} px; the camera has {}x{}", grey.cols, grey.rows,
+                                       camera_.width, camera_.height));
+    if (last_time_ns_ && time_ns <= *last_time_ns_)
+      throw Error("frame", fmt::format("time {} ns is not after the last one's, {} ns", time_ns,
+                                       *last_time_ns_));
+    if (exposure_ms && !(*exposure_ms > 0 && std::isfinite(*exposure_ms)))
+      throw Error("exposure", fmt::format("is {} ms; it has to be positive", *exposure_ms));
+    if (last_time_ns_ && exposure_ms.has_value() != first_exposure_ms_.has_value())
+      throw Error("exposure", "is known for some frames only");
+    if (!last_time_ns_) first_exposure_ms_ = exposure_ms;
+  }
+
+  // --- Poses ---
+
+  const SE3& KeyframePose(int id) const { return keyframe_poses_.at(id); }
+
+  SE3 PoseOf(const Record& record) const {
+    return record.T_cam_keyframe * KeyframePose(record.keyframe);
+  }
+
+  SE3 LastPose() const { return PoseOf(records_.back()); }
+
+  void Believe(std::int64_t time_ns, int keyframe, const SE3& T_cam_keyframe) {
+    records_.push_back({time_ns, segment_, keyframe, T_cam_keyframe});
+  }
+
+  void StorePoses() {
+    for (const auto& frame : window_) keyframe_poses_[frame->id] = frame->T_cam_world;
+  }
+
+  // --- Begin ---
+
+  void BeginMap() {
+    initializer_.emplace(camera_, options_.initializer);
+    waiting_.clear();
+    lost_ = 0;
+  }
+
+  void LeaveMap() {
+    for (const MapPoint& point : ActivePoints()) finished_.push_back(point);
+    window_.clear();
+    reference_.reset();
+    ++segment_;
+    BeginMap();
+  }
+
+  void Initialise(std::int64_t time_ns, const cv::Mat1f& image, const cv::Mat& grey,
+                  DirectFrameResult& result) {
+    const auto motion = initializer_->Add(image);
+    if (initializer_->frames() == 1) waiting_.clear();
+    waiting_.push_back({time_ns, grey.clone(), log_exposure_});
+    if (!motion) return;
+    if (MakeMap(*motion)) {
+      result.state = DirectState::kTracked;
+      result.new_keyframe = result.new_map = true;
+      result.window = last_refinement_;
+    }
+    const std::vector<Waiting> rest = std::exchange(waiting_, {});
+    if (result.new_map) {
+      initializer_.reset();
+    } else {
+      window_.clear();
+      BeginMap();
+    }
+  }
+
+  std::unique_ptr<Keyframe> NewKeyframe(std::int64_t time_ns, const SE3& T_cam_world,
+                                        double log_exposure) {
+    auto frame = std::make_unique<Keyframe>();
+    frame->id = static_cast<int>(keyframe_poses_.size());
+    frame->time_ns = time_ns;
+    frame->T_cam_world = T_cam_world;
+    frame->log_exposure = log_exposure;
+    frame->brightness.a = log_exposure;
+    keyframe_poses_.push_back(T_cam_world);
+    return frame;
+  }
+
+  void AddImmature(Keyframe& frame) {
+    for (const cv::Point& p : selector_(frame.image()))
+      frame.immature.push_back(
+          {.pixel = Vector2f(static_cast<float>(p.x), static_cast<float>(p.y))});
+  }
+
+  /// The first two key-frames, from the waiting frames' motion.
+  bool MakeMap(const InitialMotion& motion) {
+    constexpr size_t kMostViews = 12;  // that depth is searched in
+    constexpr int kLeastPoints = 100;
+    const SE3 T_world_first = records_.empty() ? SE3{} : LastPose().Inverse();
+    const size_t last = waiting_.size() - 1;
+    const size_t keyframes_before = keyframe_poses_.size();
+    const auto pose_of = [&](size_t k) { return motion.T_cam_first[k] * T_world_first.Inverse(); };
+
+    auto first = NewKeyframe(waiting_[0].time_ns, pose_of(0), waiting_[0].log_exposure);
+    aligner_.MakePyramid(correction_(waiting_[0].grey), first->pyramid);
+    AddImmature(*first);
+    const size_t stride = std::max<size_t>(1, last / kMostViews);
+    for (size_t k = last % stride == 0 ? stride : last % stride; k <= last; k += stride) {
+      aligner_.MakePyramid(correction_(waiting_[k].grey), pyramid_);
+      // Where exposures are not known, the images' means have to do.
+      Brightness brightness{waiting_[k].log_exposure, 0};
+      if (!first_exposure_ms_) brightness.a = MeanLogRatio(*first, pyramid_);
+      Trace(*first, pyramid_.samples[0], motion.T_cam_first[k],
+            Between(first->brightness, brightness));
+    }
+    auto second = NewKeyframe(waiting_[last].time_ns, pose_of(last), waiting_[last].log_exposure);
+    second->pyramid = std::move(pyramid_);
+    pyramid_ = {};
+    if (!first_exposure_ms_) second->brightness.a = MeanLogRatio(*first, second->pyramid);
+    for (const ImmaturePoint& point : first->immature)
+      if (point.found > 0 && std::isfinite(point.inverse_depth_max))
+        first->points.push_back({.pixel = point.pixel,
+                                 .inverse_depth = point.InverseDepth(),
+                                 .observations = {{second->id}}});
+    first->immature.clear();
+    optimizer_.emplace(camera_, options_.window, options_.threads);
+    optimizer_->Anchor(*first);
+    first->in_prior = true;
+    first->linearization = first->T_cam_world;
+    first->brightness_linearization = first->brightness;
+    window_.push_back(std::move(first));
+    window_.push_back(std::move(second));
+    for (int round = 0; round < 3; ++round) last_refinement_ = Refine();
+    if (CountActive() < kLeastPoints || !last_refinement_.usable) {
+      keyframe_poses_.resize(keyframes_before);
+      return false;
+    }
+    AddImmature(*window_.back());
+    PoseWaiting(motion);
+    Believe(waiting_[last].time_ns, window_.back()->id, {});
+    SetReference();
+    return true;
+  }
+
+  static double MeanLogRatio(const Keyframe& first, const alignment::Pyramid& pyramid) {
+    const auto mean = [](const alignment::SampleChannels& image) {
+      double sum = 0;
+      for (int y = 0; y < image.rows(); ++y)
+        for (int x = 0; x < image.cols(); ++x) sum += image.At(y, x)[alignment::kIntensity];
+      return sum;
+    };
+    const double ratio = mean(pyramid.samples.back()) / mean(first.pyramid.samples.back());
+    return std::isfinite(ratio) && ratio > 0 ? std::log(ratio) : 0;
+  }
+
+  /// Aligns the frames between the first two key-frames with the first.
+  void PoseWaiting(const InitialMotion& motion) {
+    const Keyframe& first = *window_.front();
+    std::vector<ReferencePoint> points;
+    for (const ActivePoint& point : first.points)
+      points.push_back({point.pixel, static_cast<float>(point.inverse_depth)});
+    const auto reference = aligner_.MakeReference(first.pyramid, points);
+    Believe(waiting_.front().time_ns, first.id, {});
+    // The refinement may have changed the scale.
+    const double scale =
+        (KeyframePose(window_.back()->id) * KeyframePose(first.id).Inverse()).p.norm() /
+        motion.T_cam_first.back().p.norm();
+    for (size_t k = 1; k + 1 < waiting_.size(); ++k) {
+      aligner_.MakePyramid(correction_(waiting_[k].grey), pyramid_);
+      SE3 guess = motion.T_cam_first[k];
+      guess.p *= scale;
+      const auto aligned = aligner_.Align(*reference, pyramid_, guess);
+      if (aligned.ok()) Believe(waiting_[k].time_ns, first.id, aligned.T_cur_ref);
+    }
+  }
+
+  // --- Every frame ---
+
+  void Track(DirectFrameResult& result) {
+    const Record& last = records_.back();
+    const SE3 T_last_ref = PoseOf(last) * KeyframePose(reference_id_).Inverse();
+    SE3 motion;
+    if (records_.size() >= 2 && records_[records_.size() - 2].segment == segment_ && lost_ == 0)
+      motion = PoseOf(last) * PoseOf(records_[records_.size() - 2]).Inverse();
+    alignment::AlignmentResult best;
+    best.failure = alignment::AlignmentFailure::kFewPoints;
+    for (const SE3& hypothesis : Hypotheses(motion)) {
+      const auto aligned = aligner_.Align(*reference_, pyramid_, hypothesis * T_last_ref);
+      ++result.hypotheses;
+      if (aligned.ok() && (!best.ok() || aligned.mean_cost < best.mean_cost)) best = aligned;
+      // As good as the last frame: no need to look further.
+      constexpr double kAlike = 1.5;
+      if (best.ok() && (best.mean_cost < kAlike * last_cost_ || result.hypotheses >= 4)) break;
+    }
+    result.inlier_share = best.inlier_share;
+    result.overlap = best.overlap;
+    if (!best.ok()) {
+      result.state = DirectState::kLost;
+      if (++lost_ > options_.lost_frames) LeaveMap();
+      return;
+    }
+    lost_ = 0;
+    last_cost_ = best.mean_cost;
+    result.state = DirectState::kTracked;
+    brightness_ = Apply(window_.back()->brightness, {best.alpha, best.beta});
+    result.brightness = brightness_;
+    T_cur_ref_ = best.T_cur_ref;
+    Believe(result.time_ns, reference_id_, best.T_cur_ref);
+  }
+
+  void Trace(Keyframe& host, const alignment::SampleChannels& image, const SE3& T_target_host,
+             const RelativeBrightness& relative) const {
+    ParallelForBatches(static_cast<int>(host.immature.size()), options_.threads, [&](int k) {
+      depth_->Trace(host, image, T_target_host, relative, host.immature[k]);
+    });
+  }
+
+  void TraceAll() {
+    const SE3 T_cur_world = LastPose();
+    for (const auto& host : window_)
+      Trace(*host, pyramid_.samples[0], T_cur_world * host->T_cam_world.Inverse(),
+            Between(host->brightness, brightness_));
+  }
+
+  bool NeedsKeyframe(const DirectFrameResult& result) const {
+    double flow = 0, parallax = 0;
+    int seen = 0;
+    const SE3 moved{Eigen::Quaterniond::Identity(), T_cur_ref_.p};
+    for (const ReferencePoint& point : reference_points_) {
+      const Seen full = Project(camera_, T_cur_ref_, point.pixel, point.inverse_depth);
+      const Seen shifted = Project(camera_, moved, point.pixel, point.inverse_depth);
+      if (!full.in_view) continue;
+      ++seen;
+      flow += (full.pixel - point.pixel).squaredNorm();
+      parallax += (shifted.pixel - point.pixel).squaredNorm();
+    }
+    if (seen == 0) return true;
+    const double side = camera_.width + camera_.height;
+    const double share = std::sqrt(flow / seen) / (options_.keyframe_flow * side) +
+                         std::sqrt(parallax / seen) / (options_.keyframe_parallax * side) +
+                         std::abs(brightness_.a - window_.back()->brightness.a) /
+                             options_.keyframe_brightness;
+    return share > 1 || result.inlier_share < options_.keyframe_inliers;
+  }
+
+  /// The points of the window as the newest key-frame sees them, for frames to be aligned with.
+  void SetReference() {
+    const Keyframe& newest = *window_.back();
+    reference_points_.clear();
+    for (const auto& host : window_) {
+      const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
+      for (const ActivePoint& point : host->points) {
+        if (host.get() != &newest && !SeenBy(point, newest.id)) continue;
+        const Seen seen = Project(camera_, T, point.pixel, point.inverse_depth);
+        if (seen.in_view) reference_points_.push_back({seen.pixel, seen.inverse_depth});
+      }
+    }
+    reference_ = aligner_.MakeReference(newest.pyramid, reference_points_);
+    reference_id_ = newest.id;
+    last_cost_ = INFINITY;
+  }
+
+  // --- Key-frames ---
+
+  int CountActive() const {
+    int count = 0;
+    for (const auto& frame : window_) count += static_cast<int>(frame->points.size());
+    return count;
+  }
+
+  WindowSummary Refine() {
+    const WindowSummary summary = optimizer_->Refine(window_, first_exposure_ms_.has_value());
+    StorePoses();
+    return summary;
+  }
+
+  void MakeKeyframe(DirectFrameResult& result) {
+    auto frame = NewKeyframe(result.time_ns, LastPose(), log_exposure_);
+    frame->brightness = brightness_;
+    frame->pyramid = std::move(pyramid_);
+    pyramid_ = std::exchange(spare_, {});
+    records_.back().keyframe = frame->id;
+    records_.back().T_cam_keyframe = {};
+    window_.push_back(std::move(frame));
+    ObserveInNewest();
+    Activate();
+    last_refinement_ = Refine();
+    result.window = last_refinement_;
+    result.new_keyframe = true;
+    SetReference();
+    LeaveWindow();
+    AddImmature(*window_.back());
+  }
+
+  void ObserveInNewest() {
+    const Keyframe& newest = *window_.back();
+    for (const auto& host : window_) {
+      const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
+      if (host->id == newest.id) continue;
+      for (ActivePoint& point : host->points)
+        if (Project(camera_, T, point.pixel, point.inverse_depth).in_view)
+          point.observations.push_back({newest.id});
+    }
+  }
+
+  struct Candidate {
+    Keyframe* host;
+    size_t index;
+    RefinedDepth refined = {};
+  };
+
+  /// Turns points that are found well into active ones, where the newest image has room.
+  void Activate() {
+    const Keyframe& newest = *window_.back();
+    const int active = CountActive();
+    if (active < 0.8 * options_.active_points) spacing_px_ = std::max(2., 0.85 * spacing_px_);
+    if (active > 1.1 * options_.active_points) spacing_px_ = std::min(40., 1.15 * spacing_px_);
+    Occupancy taken(camera_, spacing_px_);
+    for (const auto& host : window_) {
+      const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
+      for (const ActivePoint& point : host->points)
+        if (const Seen seen = Project(camera_, T, point.pixel, point.inverse_depth); seen.in_view)
+          taken.Take(seen.pixel);
+    }
+    std::vector<Candidate> candidates;
+    for (const auto& host : window_) {
+      const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
+      for (size_t k = 0; host->id != newest.id && k < host->immature.size(); ++k) {
+        const ImmaturePoint& point = host->immature[k];
+        if (!Mature(point)) continue;
+        const Seen seen = Project(camera_, T, point.pixel, point.InverseDepth());
+        if (seen.in_view && taken.Take(seen.pixel)) candidates.push_back({host.get(), k});
+      }
+    }
+    ParallelForBatches(static_cast<int>(candidates.size()), options_.threads, [&](int k) {
+      Candidate& candidate = candidates[k];
+      const ImmaturePoint& point = candidate.host->immature[candidate.index];
+      candidate.refined = depth_->Refine(*candidate.host, point.pixel, point.InverseDepth(),
+                                         ViewsOf(*candidate.host, point));
+    });
+    for (const Candidate& candidate : candidates) Promote(candidate);
+    for (const auto& host : window_) Prune(*host);
+  }
+
+  bool Mature(const ImmaturePoint& point) const {
+    constexpr float kMostInterval = 8;  // px
+    return point.found > 0 && point.quality >= options_.depth.min_quality &&
+           point.interval_px < kMostInterval && point.InverseDepth() > 0 &&
+           point.status != TraceStatus::kOutlier;
+  }
+
+  /// Views of the window's other key-frames that have the point in them.
+  std::vector<View> ViewsOf(const Keyframe& host, const ImmaturePoint& point) const {
+    std::vector<View> views;
+    for (const auto& target : window_) {
+      if (target->id == host.id) continue;
+      const SE3 T = target->T_cam_world * host.T_cam_world.Inverse();
+      if (Project(camera_, T, point.pixel, point.InverseDepth()).in_view)
+        views.push_back({target.get(), T});
+    }
+    return views;
+  }
+
+  void Promote(const Candidate& candidate) {
+    ImmaturePoint& point = candidate.host->immature[candidate.index];
+    const std::vector<View> views = ViewsOf(*candidate.host, point);
+    point.status = TraceStatus::kOutlier;  // tried: leaves in any case
+    point.found = 0;
+    if (candidate.refined.seen_by.empty()) return;
+    ActivePoint active{.pixel = point.pixel, .inverse_depth = candidate.refined.inverse_depth};
+    for (int k : candidate.refined.seen_by) active.observations.push_back({views[k].target->id});
+    candidate.host->points.push_back(active);
+  }
+
+  /// Takes out points that were activated or that are not in view any more.
+  void Prune(Keyframe& host) const {
+    const Keyframe& newest = *window_.back();
+    if (host.id == newest.id) return;
+    const SE3 T = newest.T_cam_world * host.T_cam_world.Inverse();
+    std::erase_if(host.immature, [&](const ImmaturePoint& point) {
+      if (point.status == TraceStatus::kOutlier && point.found == 0) return true;
+      const bool known = std::isfinite(point.inverse_depth_max);
+      return known && !Project(camera_, T, point.pixel, point.InverseDepth()).in_view;
+    });
+  }
+
+  MapPoint ToMapPoint(const Keyframe& host, const ActivePoint& point) const {
+    const Eigen::Vector2d ray = alignment::RayOf<double>(camera_, point.pixel.cast<double>());
+    return {.position = host.T_cam_world.Inverse() * (ray.homogeneous() / point.inverse_depth),
+            .inverse_depth = point.inverse_depth,
+            .inverse_depth_variance = point.variance,
+            .support = point.support,
+            .grey = host.image().At(static_cast<int>(point.pixel.y()),
+                                    static_cast<int>(point.pixel.x()))[alignment::kIntensity],
+            .keyframe = host.id,
+            .segment = segment_};
+  }
+
+  /// Key-frames that leave: those the newest one hardly sees and, if there are still too many, the
+  /// one that is far from the newest and near to others (Engel, Koltun, Cremers, 2018, eq. 20).
+  std::vector<int> Leaving() const {
+    const int newest = static_cast<int>(window_.size()) - 1;
+    std::vector<int> leaving;
+    int left = newest + 1;
+    for (int k = 0; k < newest - 1 && left > options_.min_keyframes; ++k) {
+      const Keyframe& frame = *window_[k];
+      const auto seen = std::count_if(
+          frame.points.begin(), frame.points.end(),
+          [&](const ActivePoint& point) { return SeenBy(point, window_[newest]->id); });
+      constexpr double kLeastSeen = 0.05;
+      const double gain = std::abs(frame.brightness.a - window_[newest]->brightness.a);
+      constexpr double kMostGain = 0.7;
+      if (static_cast<double>(seen) < kLeastSeen * std::max(1, frame.points_made) ||
+          gain > kMostGain) {
+        leaving.push_back(k);
+        --left;
+      }
+    }
+    if (left <= options_.keyframes) return leaving;
+    const auto distance = [&](int a, int b) {
+      return (window_[a]->T_cam_world.Inverse().p - window_[b]->T_cam_world.Inverse().p).norm();
+    };
+    int farthest = 0;
+    double highest = -1;
+    for (int k = 0; k < newest - 1; ++k) {
+      double near = 0;
+      for (int j = 0; j < newest - 1; ++j)
+        if (j != k) near += 1 / (distance(k, j) + 1e-5);
+      const double score = std::sqrt(distance(k, newest)) * near;
+      if (score > highest) {
+        highest = score;
+        farthest = k;
+      }
+    }
+    if (std::find(leaving.begin(), leaving.end(), farthest) == leaving.end())
+      leaving.push_back(farthest);
+    return leaving;
+  }
+
+  /// Points and key-frames leave the window: what they say stays as the prior, or is dropped.
+  void LeaveWindow() {
+    for (const auto& frame : window_)
+      frame->points_made = std::max(frame->points_made, static_cast<int>(frame->points.size()));
+    const std::vector<int> leaving = Leaving();
+    const int newest = static_cast<int>(window_.size()) - 1;
+    std::vector<std::pair<int, const ActivePoint*>> marginalised;
+    std::vector<std::vector<char>> gone(window_.size());
+    for (int k = 0; k <= newest; ++k) {
+      const bool host_leaves = std::find(leaving.begin(), leaving.end(), k) != leaving.end();
+      for (const ActivePoint& point : window_[k]->points) {
+        const bool seen = SeenBy(point, window_[newest]->id) ||
+                          (newest > 0 && SeenBy(point, window_[newest - 1]->id));
+        const bool leaves = host_leaves || !seen;
+        gone[k].push_back(leaves);
+        if (!leaves) continue;
+        finished_.push_back(ToMapPoint(*window_[k], point));
+        constexpr size_t kLeastObservations = 2;
+        if (point.observations.size() >= kLeastObservations) marginalised.emplace_back(k, &point);
+      }
+    }
+    optimizer_->Marginalize(window_, marginalised);
+    for (int k = 0; k <= newest; ++k) {
+      std::vector<ActivePoint> stay;
+      for (size_t i = 0; i < window_[k]->points.size(); ++i)
+        if (!gone[k][i]) stay.push_back(std::move(window_[k]->points[i]));
+      window_[k]->points = std::move(stay);
+    }
+    std::vector<int> ids;
+    for (int k : leaving) ids.push_back(window_[k]->id);
+    for (int id : ids) LeaveWindow(id);
+  }
+
+  void LeaveWindow(int id) {
+    const auto frame = std::find_if(window_.begin(), window_.end(),
+                                    [&](const auto& f) { return f->id == id; });
+    optimizer_->Marginalize(**frame);
+    spare_ = std::move((*frame)->pyramid);
+    window_.erase(frame);
+    for (const auto& host : window_) {
+      for (ActivePoint& point : host->points)
+        std::erase_if(point.observations, [&](const Observation& o) { return o.target == id; });
+      std::erase_if(host->points,
+                    [](const ActivePoint& point) { return point.observations.empty(); });
+    }
+  }
+
+  Camera camera_;
+  DirectOptions options_;
+  PhotometricCorrection correction_;
+  alignment::DirectAligner aligner_;
+  std::unique_ptr<const DepthEstimator> depth_;
+  PixelSelector selector_;
+
+  std::optional<Initializer> initializer_;  ///< while there is no map
+  std::vector<Waiting> waiting_;
+  std::optional<WindowOptimizer> optimizer_;
+  Window window_;
+  WindowSummary last_refinement_;
+  double spacing_px_;
+
+  std::vector<ReferencePoint> reference_points_;  ///< in the newest key-frame
+  std::shared_ptr<const alignment::DirectAligner::Reference> reference_;
+  int reference_id_ = 0;
+  double last_cost_ = INFINITY;
+
+  alignment::Pyramid pyramid_;  ///< of the frame at hand
+  alignment::Pyramid spare_;    ///< memory of a key-frame that has left
+  SE3 T_cur_ref_;
+  Brightness brightness_;
+  double log_exposure_ = 0;
+
+  std::vector<Record> records_;
+  std::vector<SE3> keyframe_poses_;  ///< T_cam_world by id, those that left as well
+  std::vector<MapPoint> finished_;
+  int segment_ = 0;
+  int lost_ = 0;
+  std::optional<std::int64_t> last_time_ns_;
+  std::optional<double> first_exposure_ms_;
+};
+
+DirectOdometry::DirectOdometry(const Camera& camera, const PhotometricCalibration& calibration,
+                               const DirectOptions& options)
+    : impl_(std::make_unique<Impl>(camera, calibration, options)) {}
+DirectOdometry::~DirectOdometry() = default;
+DirectOdometry::DirectOdometry(DirectOdometry&&) noexcept = default;
+DirectOdometry& DirectOdometry::operator=(DirectOdometry&&) noexcept = default;
+
+DirectFrameResult DirectOdometry::Process(std::int64_t time_ns, const cv::Mat& grey,
+                                          std::optional<double> exposure_ms) {
+  return impl_->Process(time_ns, grey, exposure_ms);
+}
+
+std::vector<DirectPose> DirectOdometry::Trajectory() const { return impl_->Trajectory(); }
+std::vector<MapPoint> DirectOdometry::TakeFinishedPoints() { return impl_->TakeFinishedPoints(); }
+std::vector<MapPoint> DirectOdometry::ActivePoints() const { return impl_->ActivePoints(); }
+
+std::span<const std::pair<const char*, DirectState>> EnumNames(DirectState) {
+  static constexpr std::pair<const char*, DirectState> kNames[] = {
+      {"initialising", DirectState::kInitialising},
+      {"tracked", DirectState::kTracked},
+      {"lost", DirectState::kLost}};
+  return kNames;
+}
+
+}  // namespace sgf::direct

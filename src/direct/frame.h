@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <sgf/alignment/direct_alignment.h>
+#include <sgf/core/se3.h>
+
+/// What direct odometry keeps of a key-frame.
+namespace sgf::direct {
+
+/// Brightness of an image of radiance L: I = exp(a) L + b, in grey levels. With known exposure
+/// times a begins at their logarithm.
+struct Brightness {
+  double a = 0;
+  double b = 0;
+};
+
+/// I_ref = exp(alpha) I_cur + beta, as alignment::AffinePhotoResidual has it.
+struct RelativeBrightness {
+  double alpha = 0;
+  double beta = 0;
+};
+
+inline RelativeBrightness Between(const Brightness& ref, const Brightness& cur) {
+  const double alpha = ref.a - cur.a;
+  return {alpha, ref.b - std::exp(alpha) * cur.b};
+}
+
+/// The brightness of the current image, of the reference's and what is between them.
+inline Brightness Apply(const Brightness& ref, const RelativeBrightness& relative) {
+  return {ref.a - relative.alpha, (ref.b - relative.beta) * std::exp(-relative.alpha)};
+}
+
+/// How the last search for a point has ended.
+enum class TraceStatus {
+  kNew,         ///< not searched for yet
+  kGood,        ///< found, the interval is smaller than before
+  kSkipped,     ///< the interval is smaller than what a search could tell
+  kUncertain,   ///< the epipolar line runs along the edge
+  kOutOfView,   ///< not in view
+  kOutlier,     ///< nothing on the line looks like it
+};
+
+/// A pixel of a key-frame whose depth is searched for. Inverse depths are per unit of the map,
+/// along the optical axis.
+struct ImmaturePoint {
+  Eigen::Vector2f pixel;
+  float inverse_depth_min = 0;
+  float inverse_depth_max = INFINITY;
+  float quality = 0;       ///< second best over best dissimilarity on the last line
+  float interval_px = INFINITY;  ///< length of the interval on the last line
+  TraceStatus status = TraceStatus::kNew;
+  int found = 0;           ///< how often its interval became smaller
+
+  float InverseDepth() const { return 0.5f * (inverse_depth_min + inverse_depth_max); }
+};
+
+/// How a point of the window is seen by another key-frame.
+struct Observation {
+  int target = 0;        ///< id of the key-frame
+  double mean_cost = 0;  ///< of its pixels at the last look, in squared scales of the loss
+};
+
+/// A pixel of a key-frame whose depth is known and refined in the window.
+struct ActivePoint {
+  Eigen::Vector2f pixel;
+  double inverse_depth = 0;
+  double variance = 0;       ///< of the inverse depth
+  int support = 0;           ///< good observations so far, those of frames that left as well
+  std::vector<Observation> observations = {};
+};
+
+/// A key-frame of the window.
+struct Keyframe {
+  int id = 0;
+  std::int64_t time_ns = 0;
+  SE3 T_cam_world = {};
+  Brightness brightness = {};
+  double log_exposure = 0;        ///< what `a` is expected to be
+  SE3 linearization = {};         ///< T_cam_world at which derivatives are taken
+  Brightness brightness_linearization = {};
+  bool in_prior = false;          ///< its linearisation is fixed by what was marginalised
+  alignment::Pyramid pyramid = {};
+  std::vector<ImmaturePoint> immature = {};
+  std::vector<ActivePoint> points = {};
+  int points_made = 0;            ///< that have ever been active
+
+  const alignment::SampleChannels& image() const { return pyramid.samples.front(); }
+};
+
+using Window = std::vector<std::unique_ptr<Keyframe>>;  ///< oldest first
+
+}  // namespace sgf::direct
