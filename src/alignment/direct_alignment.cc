@@ -73,8 +73,8 @@ class DirectAligner::EngineOf : public Engine {
   std::shared_ptr<const Reference> MakeReference(
       const Pyramid& pyramid, std::span<const ReferencePoint> points) const override {
     auto reference = std::make_shared<ReferenceOf>();
-    for (size_t l = 0; l < pyramid.samples.size(); ++l)
-      reference->levels.push_back(MakeLevel(pyramid, static_cast<int>(l), points));
+    for (int l = 0; l < LevelsOf(pyramid); ++l)
+      reference->levels.push_back(MakeLevel(pyramid, l, points));
     const Level& finest = reference->levels.front();
     reference->points = finest.inputs.size() / offsets_.size();
     reference->median_depth = MedianDepth(finest.inputs);
@@ -110,8 +110,14 @@ class DirectAligner::EngineOf : public Engine {
   }
 
  private:
+  static constexpr bool kOfBitPlanes = std::is_same_v<typename Residual::Channels, BitPlanes>;
+
+  static int LevelsOf(const Pyramid& pyramid) {
+    return static_cast<int>(kOfBitPlanes ? pyramid.bit_planes.size() : pyramid.samples.size());
+  }
+
   static const typename Residual::Channels& ImageOf(const Pyramid& pyramid, int level) {
-    if constexpr (std::is_same_v<typename Residual::Channels, BitPlanes>)
+    if constexpr (kOfBitPlanes)
       return pyramid.bit_planes[level];
     else
       return pyramid.samples[level];
@@ -365,7 +371,8 @@ class DirectAligner::EngineOf : public Engine {
     if (in_view < options_.min_points) return AlignmentFailure::kFewPoints;
     if (result.overlap < options_.min_overlap) return AlignmentFailure::kLittleOverlap;
     if (result.inlier_share < options_.min_inlier_share) return AlignmentFailure::kFewInliers;
-    if (!(result.condition < options_.max_condition)) return AlignmentFailure::kIllConditioned;
+    if (!(result.condition < options_.max_condition) || !result.covariance.allFinite())
+      return AlignmentFailure::kIllConditioned;
     return AlignmentFailure::kNone;
   }
 
@@ -395,6 +402,13 @@ void CheckOptions(const AlignmentOptions& options) {
           "positive");
   Require(options.solver.tolerance >= 0, "tolerance", options.solver.tolerance, "at least 0");
   Require(options.min_points >= 6, "min_points", options.min_points, "at least 6");
+  Require(options.inlier_correlation >= -1 && options.inlier_correlation <= 1, "inlier_correlation",
+          options.inlier_correlation, "in [-1, 1]");
+  Require(options.min_inlier_share >= 0 && options.min_inlier_share <= 1, "min_inlier_share",
+          options.min_inlier_share, "in [0, 1]");
+  Require(options.min_overlap >= 0 && options.min_overlap <= 1, "min_overlap", options.min_overlap,
+          "in [0, 1]");
+  Require(options.max_condition > 1, "max_condition", options.max_condition, "above 1");
   Require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
@@ -424,9 +438,11 @@ void DirectAligner::MakePyramid(const cv::Mat& grey, Pyramid& pyramid) const {
          (std::min(grey.cols, grey.rows) >> levels) >= options_.smallest_side_px)
     ++levels;
   const std::vector<cv::Mat1f> greys = GreyPyramid(grey, levels);
-  pyramid.samples.resize(levels);
-  pyramid.bit_planes.resize(options_.residual == "bit_planes" ? levels : 0);
-  for (int l = 0; l < levels; ++l) MakeSampleChannels(greys[l], options_.image, pyramid.samples[l]);
+  const bool bit_planes = options_.residual == "bit_planes";
+  pyramid.samples.resize(bit_planes ? 1 : levels);
+  pyramid.bit_planes.resize(bit_planes ? levels : 0);
+  for (size_t l = 0; l < pyramid.samples.size(); ++l)
+    MakeSampleChannels(greys[l], options_.image, pyramid.samples[l]);
   for (size_t l = 0; l < pyramid.bit_planes.size(); ++l)
     MakeBitPlanes(greys[l], pyramid.bit_planes[l]);
 }
@@ -444,6 +460,8 @@ std::shared_ptr<const DirectAligner::Reference> DirectAligner::MakeReference(
 
 AlignmentResult DirectAligner::Align(const Reference& reference, const Pyramid& current,
                                      const SE3& guess, std::optional<int> levels) const {
+  if (levels.value_or(1) < 1)
+    throw Error("levels", fmt::format("is {}; it has to be positive", *levels));
   return engine_->Align(reference, current, guess, levels.value_or(options_.levels));
 }
 

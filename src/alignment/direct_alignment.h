@@ -71,8 +71,8 @@ void CheckOptions(const AlignmentOptions& options);
 /// The levels of an image as the chosen residual needs them.
 struct Pyramid {
   cv::Size size = {};
-  std::vector<SampleChannels> samples = {};
-  std::vector<BitPlanes> bit_planes = {};  ///< empty unless the residual is bit_planes
+  std::vector<SampleChannels> samples = {};  ///< the finest alone if the residual is bit_planes
+  std::vector<BitPlanes> bit_planes = {};    ///< empty unless the residual is bit_planes
 };
 
 /// A pixel of a reference image whose depth is known.
@@ -126,9 +126,6 @@ class DirectAligner {
   DirectAligner(DirectAligner&&) noexcept;
   DirectAligner& operator=(DirectAligner&&) noexcept;
 
-  const Camera& camera() const { return camera_; }
-  const AlignmentOptions& options() const { return options_; }
-
   /// @param grey one channel, of the camera's size. @throws Error for any other image.
   Pyramid MakePyramid(const cv::Mat& grey) const;
 
@@ -140,6 +137,7 @@ class DirectAligner {
                                                  std::span<const ReferencePoint> points) const;
 
   /// Finds the motion from the reference's camera to the current one.
+  /// @throws Error for no level at all.
   /// @param reference made by an aligner of the same options.
   /// @param guess of T_cur_ref.
   /// @param levels to start with, the finest among them, where the guess is good; else all.

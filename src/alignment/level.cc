@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 
 #include <opencv2/imgproc.hpp>
@@ -7,7 +8,12 @@
 namespace sgf::alignment {
 
 void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples) {
-  static thread_local GradientImage gradient;  // memory that is used again
+  static thread_local GradientImage memory;  // of the largest image so far, used again
+  if (memory.x.rows < grey.rows || memory.x.cols < grey.cols)
+    for (cv::Mat1f* plane : {&memory.x, &memory.y})
+      plane->create(std::max(plane->rows, grey.rows), std::max(plane->cols, grey.cols));
+  const cv::Rect whole({}, grey.size());
+  GradientImage gradient{memory.x(whole), memory.y(whole)};
   ComputeGradient(grey, options.gradient, gradient);
   const cv::Mat1f epsilon = metrics::ComputeEpsilon(gradient, options.epsilon);
   cv::Mat1f intensity = grey;  // converts where it is not float

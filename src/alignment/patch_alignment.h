@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <span>
-#include <vector>
 
 #include <sgf/alignment/residual.h>
 #include <sgf/alignment/robust.h>
@@ -88,11 +87,14 @@ SolverSummary AlignPatch(const Residual& residual, const Image& image,
                          const Patch<Residual, Warp>& patch, RobustKind kind,
                          const SolverOptions& options, Warp& warp) {
   using T = typename Warp::Scalar;
-  std::vector<T> norms;
-  EvaluatePatch<T>(residual, image, warp, patch.Inputs(), patch.References(),
-                   [&](size_t, const auto& r) { norms.push_back(r.squaredNorm()); });
-  const RobustLoss<double> loss{kind,
-                                static_cast<double>(MedianScale(std::span(norms), Residual::kDim))};
+  RobustLoss<double> loss{kind};
+  if (kind != RobustKind::kNone) {
+    std::array<T, kMaxPatternPixels> norms;
+    const bool in_view =
+        EvaluatePatch<T>(residual, image, warp, patch.Inputs(), patch.References(),
+                         [&](size_t k, const auto& r) { norms[k] = r.squaredNorm(); });
+    loss.scale = MedianScale(std::span(norms.data(), in_view ? patch.size : 0), Residual::kDim);
+  }
   NormalEquations<double, Warp::kParameters> last;
   SolverSummary summary = Minimize<Warp::kParameters>(
       warp, [&](const Warp& w) { return LinearizeWhole(residual, image, patch, loss, w); },

@@ -274,6 +274,12 @@ bool LinearizePatch(const Residual& residual, const Image& image, const Warp& wa
   return true;
 }
 
+/// Whether a residual compares samples of two images and has no parameters of its own, as tracking
+/// and depth need it.
+template <class Residual>
+inline constexpr bool kOfSamplesAlone =
+    std::is_same_v<typename Residual::Channels, SampleChannels>&& Residual::kExtraParameters == 0;
+
 /// How alike the gradients of two patches are, whatever gain and offset between them:
 /// sum(g . h) / sqrt(sum |g|^2 sum |h|^2), in [-1, 1]; 0 where one is flat.
 struct GradientCorrelation {

@@ -21,9 +21,11 @@ template <class... Metrics>
 std::vector<ResidualInfo> CollectInfos(std::tuple<Metrics...>*) {
   std::vector<ResidualInfo> infos;
   (AddMetric<Metrics>(infos), ...);
-  infos.push_back({"lssd", metrics::Lssd::kInfo.formula, true});
-  infos.push_back({"photo_affine", "exp(alpha) I_i + beta - I_j", false});
-  infos.push_back({"bit_planes", "difference of eight smoothed binary images", true});
+  infos.push_back({"lssd", metrics::Lssd::kInfo.formula, LssdResidual::kInverseCompositional});
+  infos.push_back(
+      {"photo_affine", "exp(alpha) I_i + beta - I_j", AffinePhotoResidual::kInverseCompositional});
+  infos.push_back({"bit_planes", "difference of eight smoothed binary images",
+                   BitPlanesResidual::kInverseCompositional});
   return infos;
 }
 

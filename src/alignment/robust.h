@@ -86,7 +86,7 @@ class RobustCost {
     product_ = 1;
   }
 
-  const RobustLoss<T>& loss_;
+  RobustLoss<T> loss_;
   double log_factor_, inverse_spread_;
   double sum_ = 0, product_ = 1;
   int residuals_ = 0;

@@ -93,25 +93,42 @@ class StepLength {
  public:
   using Parameters = Eigen::Matrix<double, P, 1>;
 
-  double Next(const Parameters& step, const Eigen::Matrix<double, P, P>& H) {
-    if (taken_) {
-      const double ratio = before_.dot(H * step) / before_.dot(H * before_);
-      length_ = ratio < 1 ? std::clamp(length_ / (1 - ratio), kLeast, kMost) : kMost;
-    }
-    before_ = step;
+  /// @param H, b normal equations where the next step begins.
+  double Next(const Eigen::Matrix<double, P, P>& H, const Parameters& b) const {
+    if (!taken_) return 1;
+    // How much of the slope is gone, against what H promised for the step that was taken.
+    const double gone = step_.dot(b + H * full_), promised = step_.dot(H * step_);
+    return gone > 0 ? std::clamp(promised / gone, kLeast, kMost) : kMost;
+  }
+
+  /// @param step that is taken. @param full that of Gauss-Newton, without damping.
+  void Take(const Parameters& step, const Parameters& full) {
+    step_ = step;
+    full_ = full;
     taken_ = true;
-    return length_;
   }
 
   /// After a step that was taken back.
-  void Reset() { *this = {}; }
+  void Reset() { taken_ = false; }
 
  private:
   static constexpr double kLeast = 0.5, kMost = 2;
-  Parameters before_ = Parameters::Zero();
-  double length_ = 1;
+  Parameters step_ = Parameters::Zero(), full_ = Parameters::Zero();
   bool taken_ = false;
 };
+
+namespace solver_internal {
+
+/// Step of the damped normal equations.
+template <int P>
+Eigen::Matrix<double, P, 1> Step(const NormalEquations<double, P>& equations, double damping) {
+  Eigen::Matrix<double, P, P> H = equations.H();
+  H.diagonal() *= 1 + damping;
+  H.diagonal().array() += 1e-12 * H.diagonal().maxCoeff();  // a direction without any gradient
+  return -H.ldlt().solve(equations.b());
+}
+
+}  // namespace solver_internal
 
 /// Minimises from `state`. Linearises once an iteration: a step is judged by the linearisation at
 /// its end, and taken back where the mean cost has risen or too few residuals stay in view
@@ -125,6 +142,7 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
   constexpr double kLeastInView = 0.7;  // the mean must not fall by looking away
   constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-7, kMostDamping = 1e4;
   constexpr double kDampingAfterRise = 1;  // half the step: one little shorter would rise as well
+  using Parameters = Eigen::Matrix<double, P, 1>;
   const bool damped = options.method == SolverMethod::kLevenbergMarquardt;
   double damping = damped ? kFirstDamping : 0;
   SolverSummary summary;
@@ -132,18 +150,17 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
   int most_in_view = last.residuals();
   StepLength<P> length;
   while (summary.iterations < options.max_iterations && last.residuals() > 0) {
-    Eigen::Matrix<double, P, P> H = last.H();
-    H.diagonal() *= 1 + damping;
-    H.diagonal().array() += 1e-12 * H.diagonal().maxCoeff();  // a direction without any gradient
-    const Eigen::Matrix<double, P, 1> delta = -H.ldlt().solve(last.b());
-    if (!delta.allFinite()) break;
+    const Parameters full = solver_internal::Step(last, 0);
+    const Parameters delta = solver_internal::Step(last, damping);
+    if (!full.allFinite() || !delta.allFinite()) break;
     const double promised = -0.5 * last.b().dot(delta);
     ++summary.iterations;
     if (!(promised > options.tolerance * last.cost())) {
       summary.converged = promised >= 0;
       break;
     }
-    State next = update(state, damped ? length.Next(delta, last.H()) * delta : delta);
+    const Parameters step = damped ? length.Next(last.H(), last.b()) * delta : delta;
+    State next = update(state, step);
     NormalEquations<double, P> equations = linearize(next);
     const bool in_view = equations.residuals() >= kLeastInView * most_in_view;
     if (damped && !(in_view && equations.MeanCost() <= last.MeanCost())) {
@@ -156,6 +173,7 @@ SolverSummary Minimize(State& state, const Linearize& linearize, const Update& u
       continue;
     }
     damping = damped ? std::max(damping / 10, kLeastDamping) : 0;
+    length.Take(step, full);
     state = std::move(next);
     last = std::move(equations);
     most_in_view = std::max(most_in_view, last.residuals());

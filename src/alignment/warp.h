@@ -14,8 +14,8 @@
 /// A gradient is a vector: to be compared with one of the reference it is carried there, as A^T
 /// grad I with A = dW/du. The chain rule of a carried gradient thus has two terms, one from the
 /// gradient's own change with the place and one from A's change. Derivatives are handed back from
-/// the residual to the parameters, as rows (reverse mode), in two parts that every warp's Point
-/// has:
+/// the residual to the parameters (reverse mode), in two parts that every warp's Point has, each a
+/// column of the parameters' length:
 ///
 ///     Along(c)   = c^T dW/dp
 ///     Turn(w, v) = w^T d(A^T v)/dp    at constant w and v
@@ -182,7 +182,8 @@ struct Projector {
         R_per_px_x(R.col(0) / fx),
         R_per_px_y(R.col(1) / fy) {}
 
-  /// @return false for a point that is not in front of the camera.
+  /// @return false for a point that is not in front of the camera: of less than a thousandth of its
+  /// depth in the reference.
   bool operator()(const PixelAtDepth<T>& u, Projection<T>& out) const {
     out.X = R.col(0) * u.ray.x() + R.col(1) * u.ray.y() + R.col(2) + u.inverse_depth * p;
     if (!(out.X.z() > T(1e-3))) return false;

@@ -123,14 +123,9 @@ void CheckStudy(const ConvergenceOptions& options, const std::string& file) {
   Require(options.converged_px > 0, file, "study.converged_px must be positive");
 }
 
-// Residuals of one image's samples with nothing else to estimate.
-template <class Residual>
-constexpr bool kTrackable =
-    std::is_same_v<typename Residual::Channels, SampleChannels>&& Residual::kExtraParameters == 0;
-
 void CheckColumn(const Column& column, const std::string& file) {
   const bool trackable = VisitStudiedResidual(column.residual, [](const auto& residual) {
-    return kTrackable<std::remove_cvref_t<decltype(residual)>>;
+    return alignment::kOfSamplesAlone<std::remove_cvref_t<decltype(residual)>>;
   });
   Require(trackable, file,
           fmt::format("columns.{}: '{}' cannot be tracked here", column.name, column.residual));
@@ -351,7 +346,7 @@ std::vector<Errors> TrackColumn(const Column& column, const std::vector<SamplePa
                                 const Scene& scene) {
   std::vector<Errors> errors;
   VisitStudiedResidual(column.residual, [&](const auto& residual) {
-    if constexpr (kTrackable<std::remove_cvref_t<decltype(residual)>>)
+    if constexpr (alignment::kOfSamplesAlone<std::remove_cvref_t<decltype(residual)>>)
       VisitMotion(scene.run.motion, [&](auto warp) {
         for (const Start& start : Starts(scene.run))
           errors.push_back(

@@ -64,10 +64,13 @@ class GyroBuffer {
     if (samples_.empty() || time_ns > samples_.back().time_ns) samples_.push_back({time_ns, rate});
   }
 
+  /// Forgets what has no say after a time.
+  void DropBefore(std::int64_t time_ns) {
+    while (samples_.size() > 1 && samples_[1].time_ns <= time_ns) samples_.pop_front();
+  }
+
   /// Rotation R_from_to, each rate holding until the next; none where samples do not span the time.
-  /// Drops what lies before `from_ns`.
-  std::optional<Eigen::Quaterniond> Integrate(std::int64_t from_ns, std::int64_t to_ns) {
-    while (samples_.size() > 1 && samples_[1].time_ns <= from_ns) samples_.pop_front();
+  std::optional<Eigen::Quaterniond> Integrate(std::int64_t from_ns, std::int64_t to_ns) const {
     constexpr std::int64_t kMostGap = 20'000'000;
     if (samples_.empty() || samples_.front().time_ns > from_ns + kMostGap ||
         samples_.back().time_ns < to_ns - kMostGap)
@@ -92,6 +95,26 @@ class GyroBuffer {
 
 }  // namespace
 
+void CheckOptions(const OdometryOptions& options) {
+  const auto require = [](bool valid, const char* option, double value, const char* range) {
+    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
+  };
+  CheckOptions(options.selection);
+  CheckOptions(options.refinement);
+  if (!(options.min_depth_m > 0 && options.max_depth_m > options.min_depth_m &&
+        std::isfinite(options.max_depth_m)))
+    throw Error("min_depth_m", fmt::format("is {} with max_depth_m {}; 0 < min < max < infinity",
+                                           options.min_depth_m, options.max_depth_m));
+  require(options.keyframe_overlap >= 0 && options.keyframe_overlap <= 1, "keyframe_overlap",
+          options.keyframe_overlap, "in [0, 1]");
+  require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
+          options.keyframe_inliers, "in [0, 1]");
+  require(options.tracking_levels >= 1, "tracking_levels", options.tracking_levels, "positive");
+  require(options.relocation_keyframes >= 1, "relocation_keyframes", options.relocation_keyframes,
+          "positive");
+  require(options.lost_frames >= 0, "lost_frames", options.lost_frames, "at least 0");
+}
+
 class Odometry::Impl {
  public:
   Impl(const Rig& rig, const OdometryOptions& options)
@@ -99,13 +122,9 @@ class Odometry::Impl {
         options_(options),
         aligner_(rig.camera, options.alignment),
         matcher_(options.matcher) {
-    CheckOptions(options.selection);
-    CheckOptions(options.refinement);
+    CheckOptions(options);
     if (!(rig.baseline_m >= 0))
       throw Error("baseline_m", fmt::format("is {}; it has to be at least 0", rig.baseline_m));
-    if (!(options.min_depth_m > 0 && options.max_depth_m > options.min_depth_m))
-      throw Error("min_depth_m", fmt::format("is {} with max_depth_m {}; 0 < min < max",
-                                             options.min_depth_m, options.max_depth_m));
   }
 
   FrameResult ProcessStereo(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right) {
@@ -147,6 +166,7 @@ class Odometry::Impl {
     SE3 T_world_cam;
     SE3 motion = {};  ///< of the camera over the last period, T_before_cam
     double period_s = 0;
+    bool believed = false;
   };
 
   void CheckImage(const cv::Mat& image) const {
@@ -177,15 +197,25 @@ class Odometry::Impl {
     }
     result.times.alignment_s = stage.Lap();
     lost_frames_ = result.state == TrackingState::kLost ? lost_frames_ + 1 : 0;
-    if (lost_frames_ > options_.lost_frames) result.state = TrackingState::kInitialised;
+    if (lost_frames_ > options_.lost_frames) BeginAnew(result);
     if (NeedsKeyframe(result)) AddKeyframe(make_points, result);
+    if (result.state == TrackingState::kInitialised) lost_frames_ = 0;
     Remember(result);
     result.times.total_s = total.Lap();
     return result;
   }
 
+  /// At the predicted pose: what alignment found does not count.
+  static void BeginAnew(FrameResult& result) {
+    result = {.time_ns = result.time_ns,
+              .state = TrackingState::kInitialised,
+              .T_world_cam = result.T_world_cam,
+              .iterations = result.iterations,
+              .times = result.times};
+  }
+
   /// Motion since the last frame: rotation by gyroscope, else as over the period before.
-  SE3 Predict(std::int64_t time_ns) {
+  SE3 Predict(std::int64_t time_ns) const {
     const double share =
         last_->period_s > 0 ? Seconds(time_ns - last_->time_ns) / last_->period_s : 0;
     SE3 motion{ExpSO3(share * LogSO3(last_->motion.R)), share * last_->motion.p};
@@ -249,12 +279,15 @@ class Odometry::Impl {
   }
 
   void Remember(const FrameResult& result) {
-    Last next{.time_ns = result.time_ns, .T_world_cam = result.T_world_cam};
-    if (last_ && result.state == TrackingState::kTracked) {
+    Last next{.time_ns = result.time_ns,
+              .T_world_cam = result.T_world_cam,
+              .believed = result.state != TrackingState::kLost};
+    if (last_ && last_->believed && result.state == TrackingState::kTracked) {
       next.motion = last_->T_world_cam.Inverse() * result.T_world_cam;
       next.period_s = Seconds(result.time_ns - last_->time_ns);
     }
     last_ = next;
+    gyro_.DropBefore(result.time_ns);
   }
 
   Points StereoPoints(const cv::Mat& left, const cv::Mat& right, StageTimes& times) {
@@ -270,6 +303,7 @@ class Odometry::Impl {
       alignment::MakeSampleChannels(right, options_.alignment.image, right_samples_);
       RefineDepths(pyramid_.samples[0], right_samples_, rig_.camera, rig_.baseline_m,
                    options_.refinement, points);
+      std::erase_if(points, [&](const auto& point) { return !InRange(point.inverse_depth); });
     }
     times.selection_s = stage.Lap();
     return points;
@@ -285,17 +319,17 @@ class Odometry::Impl {
     return points;
   }
 
+  bool InRange(float inverse_depth) const {
+    return inverse_depth >= static_cast<float>(1 / options_.max_depth_m) &&
+           inverse_depth <= static_cast<float>(1 / options_.min_depth_m);
+  }
+
   /// @param inverse_depth of a pixel, 1/m; 0 where unknown.
   template <class InverseDepth>
   Points Select(const InverseDepth& inverse_depth) const {
-    const auto nearest = static_cast<float>(1 / options_.min_depth_m);
-    const auto farthest = static_cast<float>(1 / options_.max_depth_m);
     cv::Mat1b eligible(pyramid_.size);
     for (int y = 0; y < eligible.rows; ++y)
-      for (int x = 0; x < eligible.cols; ++x) {
-        const float value = inverse_depth(y, x);
-        eligible(y, x) = value >= farthest && value <= nearest;
-      }
+      for (int x = 0; x < eligible.cols; ++x) eligible(y, x) = InRange(inverse_depth(y, x));
     Points points;
     for (const cv::Point& p :
          alignment::SelectPoints(pyramid_.samples[0], eligible, options_.selection))

@@ -64,6 +64,9 @@ struct OdometryOptions {
   }
 };
 
+/// @throws Error for an option out of range.
+void CheckOptions(const OdometryOptions& options);
+
 /// The cameras of an odometry: an ideal pinhole camera and, for rectified stereo, its twin.
 struct Rig {
   Camera camera;          ///< of the left (or only) image, without distortion
@@ -82,26 +85,27 @@ std::span<const std::pair<const char*, TrackingState>> EnumNames(TrackingState);
 struct StageTimes {
   double pyramid_s = 0;
   double alignment_s = 0;
-  double depth_s = 0;  ///< stereo matching; 0 where no key-frame was made
-  double selection_s = 0;
+  double depth_s = 0;      ///< stereo matching; 0 where no key-frame was wanted
+  double selection_s = 0;  ///< of a key-frame's points, with their refinement and patches
   double total_s = 0;
 };
 
-/// What is known after a frame. World is the first frame's camera (x right, y down, z forward).
+/// What is known after a frame. World is the first
+/// key-frame's camera (x right, y down, z forward).
 struct FrameResult {
   std::int64_t time_ns = 0;
   TrackingState state = TrackingState::kLost;
   SE3 T_world_cam = {};
   /// Of the motion since the key-frame, in the tangent of T_cam_keyframe (left perturbation,
-  /// translation in m before rotation in rad).
+  /// translation in m before rotation in rad). 0 unless tracked.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   int keyframe = -1;          ///< index of the key-frame it was aligned with, counted from 0
   bool new_keyframe = false;  ///< this frame has become one
   double overlap = 0;         ///< share of the key-frame's points that are in view
-  double inlier_share = 0;    ///< of the residuals in view
+  double inlier_share = 0;    ///< of the points in view
   double condition = 0;       ///< of the normal equations
   alignment::AlignmentFailure failure = alignment::AlignmentFailure::kNone;  ///< of the last try
-  int iterations = 0;
+  int iterations = 0;                                                        ///< of all tries
   StageTimes times = {};
 };
 

@@ -55,7 +55,7 @@ class Refiner {
     alignment::GradientCorrelation correlation;
     for (const Eigen::Vector2f& offset : offsets_) {
       Warp::Point point;
-      if (!warp.At(InputAt(reference, offset), point) || !right_.Inside(point.pixel)) return 0;
+      if (!warp.At(InputAt(reference, offset), point) || !right_.Inside(point.pixel)) return -2;
       correlation.Add(point.A().transpose() * GradientAt(right_, point.pixel),
                       GradientAt(left_, reference.pixel + offset));
     }
@@ -78,12 +78,20 @@ class Refiner {
 }  // namespace
 
 void CheckOptions(const RefinementOptions& options) {
-  if (alignment::FindResidual(options.residual).name == "bit_planes" ||
-      options.residual == "photo_affine")
-    throw Error("refinement.residual", fmt::format("'{}' cannot refine depths", options.residual));
+  alignment::VisitResidual(options.residual, [&](const auto& residual) {
+    if constexpr (!alignment::kOfSamplesAlone<std::remove_cvref_t<decltype(residual)>>)
+      throw Error("refinement.residual",
+                  fmt::format("'{}' cannot refine depths", options.residual));
+  });
   if (options.max_iterations < 1)
     throw Error("refinement.max_iterations",
                 fmt::format("is {}; it has to be positive", options.max_iterations));
+  if (!(options.max_change_px > 0))
+    throw Error("refinement.max_change_px",
+                fmt::format("is {}; it has to be positive", options.max_change_px));
+  if (!(options.min_correlation >= -1 && options.min_correlation < 1))
+    throw Error("refinement.min_correlation",
+                fmt::format("is {}; it has to be in [-1, 1)", options.min_correlation));
 }
 
 void RefineDepths(const SampleChannels& left, const SampleChannels& right, const Camera& camera,
@@ -91,8 +99,7 @@ void RefineDepths(const SampleChannels& left, const SampleChannels& right, const
                   std::vector<alignment::ReferencePoint>& points) {
   alignment::VisitResidual(options.residual, [&](const auto& residual) {
     using Residual = std::remove_cvref_t<decltype(residual)>;
-    if constexpr (std::is_same_v<typename Residual::Channels, SampleChannels> &&
-                  Residual::kExtraParameters == 0) {
+    if constexpr (alignment::kOfSamplesAlone<Residual>) {
       const Refiner<Residual> refine(left, right, camera, baseline_m, options);
       std::erase_if(points, [&](alignment::ReferencePoint& point) { return !refine(point); });
     }

@@ -74,8 +74,7 @@ void ForEachExactResidual(const Body& body) {
   for (const ResidualInfo& info : AllResiduals())
     VisitResidual(info.name, [&](const auto& residual) {
       using Residual = std::remove_cvref_t<decltype(residual)>;
-      if constexpr (std::is_same_v<typename Residual::Channels, SampleChannels> &&
-                    Residual::kExtraParameters == 0) {
+      if constexpr (kOfSamplesAlone<Residual>) {
         SCOPED_TRACE(std::string(info.name));
         if (info.name != "ngf" && info.name != "ugf") body(residual);
       }

@@ -102,6 +102,11 @@ TEST(Odometry, StartsAnewAfterBeingLostForLong) {
   const FrameResult anew = odometry.ProcessDepth((4 + lost) * kPeriod, view.grey, view.depth_m);
   EXPECT_EQ(anew.state, TrackingState::kInitialised);
   EXPECT_TRUE(anew.new_keyframe);
+  // Not again at once, though there would be points to start from.
+  cv::Mat1b noise(kRig.camera.height, kRig.camera.width);
+  cv::RNG(1).fill(noise, cv::RNG::UNIFORM, 0, 256);
+  EXPECT_EQ(odometry.ProcessDepth((5 + lost) * kPeriod, noise, view.depth_m).state,
+            TrackingState::kLost);
 }
 
 TEST(Odometry, TakesRotationsFromTheGyroscope) {
@@ -153,14 +158,18 @@ TEST(Odometry, IgnoresDepthThatIsNone) {
 }
 
 TEST(Odometry, RefusesOptionsOutOfRange) {
-  OdometryOptions options;
-  options.min_depth_m = 5;
-  options.max_depth_m = 2;
-  EXPECT_THAT(ErrorMessage([&] { Odometry(kRig, options); }), testing::HasSubstr("min_depth_m"));
-  options = {};
-  options.refinement.residual = "photo_affine";
-  EXPECT_THAT(ErrorMessage([&] { Odometry(kRig, options); }),
-              testing::HasSubstr("cannot refine depths"));
+  const auto expect_refused = [](const char* message, const auto& change) {
+    OdometryOptions options;
+    change(options);
+    EXPECT_THAT(ErrorMessage([&] { Odometry(kRig, options); }), testing::HasSubstr(message));
+  };
+  expect_refused("min_depth_m", [](auto& o) { o.min_depth_m = 2 * o.max_depth_m; });
+  expect_refused("min_depth_m", [](auto& o) { o.max_depth_m = INFINITY; });
+  expect_refused("tracking_levels", [](auto& o) { o.tracking_levels = 0; });
+  expect_refused("lost_frames", [](auto& o) { o.lost_frames = -1; });
+  expect_refused("keyframe_overlap", [](auto& o) { o.keyframe_overlap = NAN; });
+  expect_refused("cannot refine depths", [](auto& o) { o.refinement.residual = "photo_affine"; });
+  expect_refused("max_change_px", [](auto& o) { o.refinement.max_change_px = 0; });
   EXPECT_THAT(ErrorMessage([&] {
                 Odometry({kRig.camera, 0}, {}).ProcessStereo(0, {}, {});
               }),
