@@ -52,6 +52,23 @@ class ChannelImage {
     return p.x() >= T(1) && p.y() >= T(1) && p.x() < T(cols_ - 2) && p.y() < T(rows_ - 2);
   }
 
+  /// Channels at a place that is Inside(), without their derivatives.
+  template <class T>
+  Eigen::Array<T, N, 1> Value(const Eigen::Matrix<T, 2, 1>& p) const {
+    using Pixel = Eigen::Map<const Eigen::Array<float, N, 1>>;
+    const int x = static_cast<int>(p.x());
+    const int y = static_cast<int>(p.y());
+    const T fx = p.x() - T(x);
+    const T fy = p.y() - T(y);
+    const float* upper = At(y, x);
+    const float* lower = upper + size_t(cols_) * N;
+    const Eigen::Array<T, N, 1> a = Pixel(upper).template cast<T>();
+    const Eigen::Array<T, N, 1> c = Pixel(lower).template cast<T>();
+    const Eigen::Array<T, N, 1> top = a + fx * (Pixel(upper + N).template cast<T>() - a);
+    const Eigen::Array<T, N, 1> bottom = c + fx * (Pixel(lower + N).template cast<T>() - c);
+    return top + fy * (bottom - top);
+  }
+
   /// Channels at a place that is Inside().
   template <class T>
   ChannelsAt<T, N> Sample(const Eigen::Matrix<T, 2, 1>& p) const {

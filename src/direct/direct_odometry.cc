@@ -5,6 +5,7 @@
 
 #include <fmt/core.h>
 
+#include <sgf/alignment/warp.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
 #include <sgf/direct/direct_odometry.h>
@@ -68,8 +69,8 @@ class Occupancy {
 
   /// @return whether the place was free; it is taken then.
   bool Take(const Vector2f& pixel) {
-    uint8_t& cell = cells_(static_cast<int>(pixel.y() / spacing_),
-                           static_cast<int>(pixel.x() / spacing_));
+    uint8_t& cell =
+        cells_(static_cast<int>(pixel.y() / spacing_), static_cast<int>(pixel.x() / spacing_));
     if (cell) return false;
     cell = 1;
     return true;
@@ -437,10 +438,10 @@ class DirectOdometry::Impl {
     }
     if (seen == 0) return true;
     const double side = camera_.width + camera_.height;
-    const double share = std::sqrt(flow / seen) / (options_.keyframe_flow * side) +
-                         std::sqrt(parallax / seen) / (options_.keyframe_parallax * side) +
-                         std::abs(brightness_.a - window_.back()->brightness.a) /
-                             options_.keyframe_brightness;
+    const double share =
+        std::sqrt(flow / seen) / (options_.keyframe_flow * side) +
+        std::sqrt(parallax / seen) / (options_.keyframe_parallax * side) +
+        std::abs(brightness_.a - window_.back()->brightness.a) / options_.keyframe_brightness;
     return share > 1 || result.inlier_share < options_.keyframe_inliers;
   }
 
@@ -672,8 +673,8 @@ class DirectOdometry::Impl {
   }
 
   void LeaveWindow(int id) {
-    const auto frame = std::find_if(window_.begin(), window_.end(),
-                                    [&](const auto& f) { return f->id == id; });
+    const auto frame =
+        std::find_if(window_.begin(), window_.end(), [&](const auto& f) { return f->id == id; });
     optimizer_->Marginalize(**frame);
     spare_ = std::move((*frame)->pyramid);
     window_.erase(frame);

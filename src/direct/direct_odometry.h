@@ -43,8 +43,8 @@ struct DirectOptions {
   int active_points = 1500;
   int keyframes = 7;
   int min_keyframes = 5;
-  double keyframe_flow = 0.02;
-  double keyframe_parallax = 0.04;
+  double keyframe_flow = 0.045;
+  double keyframe_parallax = 0.022;
   double keyframe_brightness = 0.5;
   double keyframe_inliers = 0.6;
   int lost_frames = 5;
@@ -86,7 +86,7 @@ std::span<const std::pair<const char*, DirectState>> EnumNames(DirectState);
 
 /// Time spent on a frame, s.
 struct DirectTimes {
-  double image_s = 0;     ///< photometric correction and pyramid
+  double image_s = 0;  ///< photometric correction and pyramid
   double tracking_s = 0;
   double tracing_s = 0;
   double keyframe_s = 0;  ///< activation, refinement of the window, marginalisation, new points
@@ -100,13 +100,13 @@ struct DirectFrameResult {
   /// Number of the map, counted from 0. Each begins at the last believed pose and has a scale of
   /// its own.
   int segment = 0;
-  SE3 T_world_cam = {};       ///< if tracked
+  SE3 T_world_cam = {};  ///< if tracked
   bool new_keyframe = false;
-  bool new_map = false;       ///< this frame is the first with a pose of its segment
-  double inlier_share = 0;    ///< of the points in view
-  double overlap = 0;         ///< share of points that are in view
+  bool new_map = false;     ///< this frame is the first with a pose of its segment
+  double inlier_share = 0;  ///< of the points in view
+  double overlap = 0;       ///< share of points that are in view
   Brightness brightness = {};
-  int hypotheses = 0;         ///< motions that were tried
+  int hypotheses = 0;  ///< motions that were tried
   int active_points = 0;
   WindowSummary window = {};  ///< if it became a key-frame
   DirectTimes times = {};
@@ -122,10 +122,10 @@ struct DirectPose {
 /// A point of the map.
 struct MapPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the world
-  double inverse_depth = 0;       ///< in its key-frame
+  double inverse_depth = 0;                            ///< in its key-frame
   double inverse_depth_variance = 0;
-  int support = 0;                ///< key-frames that saw it
-  float grey = 0;                 ///< grey levels
+  int support = 0;  ///< key-frames that saw it
+  float grey = 0;   ///< grey levels
   int keyframe = 0;
   int segment = 0;
 };

@@ -38,12 +38,12 @@ inline Brightness Apply(const Brightness& ref, const RelativeBrightness& relativ
 
 /// How the last search for a point has ended.
 enum class TraceStatus {
-  kNew,         ///< not searched for yet
-  kGood,        ///< found, the interval is smaller than before
-  kSkipped,     ///< the interval is smaller than what a search could tell
-  kUncertain,   ///< the epipolar line runs along the edge
-  kOutOfView,   ///< not in view
-  kOutlier,     ///< nothing on the line looks like it
+  kNew,        ///< not searched for yet
+  kGood,       ///< found, the interval is smaller than before
+  kSkipped,    ///< the interval is smaller than what a search could tell
+  kUncertain,  ///< the epipolar line runs along the edge
+  kOutOfView,  ///< not in view
+  kOutlier,    ///< nothing on the line looks like it
 };
 
 /// A pixel of a key-frame whose depth is searched for. Inverse depths are per unit of the map,
@@ -52,10 +52,10 @@ struct ImmaturePoint {
   Eigen::Vector2f pixel;
   float inverse_depth_min = 0;
   float inverse_depth_max = INFINITY;
-  float quality = 0;       ///< second best over best dissimilarity on the last line
+  float quality = 0;             ///< second best over best dissimilarity on the last line
   float interval_px = INFINITY;  ///< length of the interval on the last line
   TraceStatus status = TraceStatus::kNew;
-  int found = 0;           ///< how often its interval became smaller
+  int found = 0;  ///< how often its interval became smaller
 
   float InverseDepth() const { return 0.5f * (inverse_depth_min + inverse_depth_max); }
 };
@@ -70,8 +70,8 @@ struct Observation {
 struct ActivePoint {
   Eigen::Vector2f pixel;
   double inverse_depth = 0;
-  double variance = 0;       ///< of the inverse depth
-  int support = 0;           ///< good observations so far, those of frames that left as well
+  double variance = 0;  ///< of the inverse depth
+  int support = 0;      ///< good observations so far, those of frames that left as well
   std::vector<Observation> observations = {};
 };
 
@@ -81,14 +81,14 @@ struct Keyframe {
   std::int64_t time_ns = 0;
   SE3 T_cam_world = {};
   Brightness brightness = {};
-  double log_exposure = 0;        ///< what `a` is expected to be
-  SE3 linearization = {};         ///< T_cam_world at which derivatives are taken
+  double log_exposure = 0;  ///< what `a` is expected to be
+  SE3 linearization = {};   ///< T_cam_world at which derivatives are taken
   Brightness brightness_linearization = {};
-  bool in_prior = false;          ///< its linearisation is fixed by what was marginalised
+  bool in_prior = false;  ///< its linearisation is fixed by what was marginalised
   alignment::Pyramid pyramid = {};
   std::vector<ImmaturePoint> immature = {};
   std::vector<ActivePoint> points = {};
-  int points_made = 0;            ///< that have ever been active
+  int points_made = 0;  ///< that have ever been active
 
   const alignment::SampleChannels& image() const { return pyramid.samples.front(); }
 };

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Core>
 #include <fmt/core.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
@@ -117,7 +118,8 @@ std::optional<InitialMotion> Initializer::Solve() const {
   cv::Mat triangulated;
   constexpr double kFarthest = 200;  // baselines
   cv::recoverPose(E, first, last, K, R, t, kFarthest, inliers, triangulated);
-  const auto agree = std::count_if(inliers.begin(), inliers.end(), [](uchar in) { return in != 0; });
+  const auto agree =
+      std::count_if(inliers.begin(), inliers.end(), [](uchar in) { return in != 0; });
   if (agree < kLeastCorners / 2 ||
       static_cast<double>(agree) < options_.min_inliers * static_cast<double>(first.size()))
     return std::nullopt;

@@ -12,8 +12,8 @@ PhotometricCorrection::PhotometricCorrection(const PhotometricCalibration& calib
     : size_(size), lookup_(1, 256) {
   const std::vector<double>& response = calibration.inverse_response;
   if (!response.empty() && response.size() != 256)
-    throw Error("inverse response", fmt::format("has {} values; it has to have 256, or none",
-                                                response.size()));
+    throw Error("inverse response",
+                fmt::format("has {} values; it has to have 256, or none", response.size()));
   if (std::adjacent_find(response.begin(), response.end(), std::greater_equal<>()) !=
       response.end())
     throw Error("inverse response", "does not rise");

@@ -28,8 +28,8 @@ class PhotometricCorrection {
 
  private:
   cv::Size size_;
-  cv::Mat1f lookup_;        ///< 1 x 256, grey levels
-  cv::Mat1f gain_;          ///< 1 / V, or empty
+  cv::Mat1f lookup_;  ///< 1 x 256, grey levels
+  cv::Mat1f gain_;    ///< 1 / V, or empty
 };
 
 }  // namespace sgf::direct

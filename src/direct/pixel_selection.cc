@@ -29,8 +29,7 @@ cv::Mat1f Thresholds(const SampleChannels& image, const PixelSelectionOptions& o
           gradients.push_back(SquaredGradient(image.At(y, x)));
       const auto middle = gradients.begin() + static_cast<ptrdiff_t>(gradients.size() / 2);
       std::nth_element(gradients.begin(), middle, gradients.end());
-      thresholds(row, col) =
-          std::sqrt(*middle) + static_cast<float>(options.above_median);
+      thresholds(row, col) = std::sqrt(*middle) + static_cast<float>(options.above_median);
     }
   cv::Mat1f smooth;
   cv::blur(thresholds, smooth, {3, 3}, {-1, -1}, cv::BORDER_REPLICATE);

@@ -17,7 +17,8 @@ using Eigen::Matrix2f, Eigen::Vector2f, Eigen::Vector3f;
 
 /// A reference sample as an image of another brightness would have it.
 metrics::Sample<float> Brightened(const metrics::Sample<float>& sample, float gain, float offset) {
-  const float epsilon = std::max(sample.reg_norm * sample.reg_norm - sample.norm * sample.norm, 0.f);
+  const float epsilon =
+      std::max(sample.reg_norm * sample.reg_norm - sample.norm * sample.norm, 0.f);
   return metrics::MakeSample<float>(gain * sample.intensity + offset, gain * sample.gx,
                                     gain * sample.gy, gain * gain * epsilon);
 }
@@ -33,30 +34,31 @@ class DepthEstimatorOf : public DepthEstimator {
   void Trace(const Keyframe& host, const SampleChannels& image, const SE3& T_target_host,
              const RelativeBrightness& relative, ImmaturePoint& point) const override {
     Warp warp(camera_, T_target_host, point.inverse_depth_min);
-    Patch patch;
-    if (!MakePatchOf(host.image(), point.pixel, relative, patch)) {
-      point.status = TraceStatus::kOutOfView;
-      return;
-    }
     Line line;
     if (!LineOf(warp, point, line)) {
       point.status = TraceStatus::kOutOfView;
       return;
     }
     point.interval_px = line.length;
-    const float error_px = ErrorAcross(host.image(), point.pixel, line);
     constexpr float kSettled = 1.5f;  // px
-    if (std::isfinite(point.inverse_depth_max)) {
-      if (line.length < kSettled) {
-        point.status = TraceStatus::kSkipped;
-        return;
-      }
+    const bool bounded = std::isfinite(point.inverse_depth_max);
+    if (bounded && line.length < kSettled) {
+      point.status = TraceStatus::kSkipped;
+      return;
+    }
+    const float error_px = ErrorAcross(host.image(), point.pixel, line);
+    if (bounded) {
       if (2 * error_px > line.length) {
         point.status = TraceStatus::kUncertain;
         return;
       }
     } else if (error_px > kMostErrorPx) {
       point.status = TraceStatus::kUncertain;
+      return;
+    }
+    Patch patch;
+    if (!MakePatchOf(host.image(), point.pixel, relative, patch)) {
+      point.status = TraceStatus::kOutOfView;
       return;
     }
     Search(image, patch, warp, line, point);
@@ -88,8 +90,8 @@ class DepthEstimatorOf : public DepthEstimator {
       for (size_t k = 0; k < views.size(); ++k) {
         Warp warp = warps[k];
         warp.inverse_depth = depth;
-        sum += alignment::LinearizeWhole(residual_, views[k].target->image(), patches[k], loss,
-                                         warp);
+        sum +=
+            alignment::LinearizeWhole(residual_, views[k].target->image(), patches[k], loss, warp);
       }
       return sum;
     };
@@ -97,8 +99,8 @@ class DepthEstimatorOf : public DepthEstimator {
     alignment::NormalEquations<double, 1> last;
     alignment::Minimize<1>(
         depth, linearize,
-        [](float d, const auto& delta) { return d + static_cast<float>(delta(0)); },
-        Solver(), last);
+        [](float d, const auto& delta) { return d + static_cast<float>(delta(0)); }, Solver(),
+        last);
     RefinedDepth result{depth, last.H()(0, 0) / (loss.scale * loss.scale)};
     for (size_t k = 0; k < views.size(); ++k) {
       warps[k].inverse_depth = depth;
@@ -155,8 +157,7 @@ class DepthEstimatorOf : public DepthEstimator {
     const float speed = direction.norm();
     if (!(speed > 1e-6f)) return false;
     line.direction = direction / speed;
-    const auto most =
-        static_cast<float>(options_.max_length * (camera_.width + camera_.height));
+    const auto most = static_cast<float>(options_.max_length * (camera_.width + camera_.height));
     line.length = most;
     if (std::isfinite(point.inverse_depth_max)) {
       Warp to = warp;
@@ -176,7 +177,7 @@ class DepthEstimatorOf : public DepthEstimator {
     const Vector2f across(-along.y(), along.x());
     float with = 0, against = 0;
     for (const Vector2f& offset : alignment::Offsets(alignment::Pattern::kDso8)) {
-      const Vector2f gradient = GradientOf(image.Sample<float>(pixel + offset).value);
+      const Vector2f gradient = GradientOf(image.Value<float>(pixel + offset));
       with += gradient.dot(along) * gradient.dot(along);
       against += gradient.dot(across) * gradient.dot(across);
     }
@@ -201,8 +202,7 @@ class DepthEstimatorOf : public DepthEstimator {
     for (size_t k = 0; k < patch.size; ++k) {
       const Vector2f pixel = place + A * offsets[k];
       if (!image.Inside(pixel)) return kInfinite;
-      cost += residual_
-                  .template Value<float>(image.Sample(pixel).value, A, patch.references[k])
+      cost += residual_.template Value<float>(image.Value(pixel), A, patch.references[k])
                   .squaredNorm();
     }
     return cost;
@@ -216,10 +216,10 @@ class DepthEstimatorOf : public DepthEstimator {
     const int steps = std::clamp(static_cast<int>(std::ceil(line.length)) + 1, 2, kMostSteps);
     const float stride = line.length / static_cast<float>(steps - 1);
     for (int k = 0; k < steps; ++k)
-      costs[k] = Cost(image, patch,
-                      line.from + static_cast<float>(k) * stride * line.direction, line.A);
-    const int best = static_cast<int>(std::min_element(costs.begin(), costs.begin() + steps) -
-                                      costs.begin());
+      costs[k] =
+          Cost(image, patch, line.from + static_cast<float>(k) * stride * line.direction, line.A);
+    const int best =
+        static_cast<int>(std::min_element(costs.begin(), costs.begin() + steps) - costs.begin());
     if (!(costs[best] < 1e29f)) {
       point.status = TraceStatus::kOutOfView;
       return;
@@ -243,8 +243,8 @@ class DepthEstimatorOf : public DepthEstimator {
                    point) ||
           !image.Inside(point.pixel))
         return -1;
-      correlation.Add(point.A().transpose() * GradientOf(image.Sample(point.pixel).value),
-                      GradientOf(host.Sample<float>(pixel + offset).value));
+      correlation.Add(point.A().transpose() * GradientOf(image.Value(point.pixel)),
+                      GradientOf(host.Value<float>(pixel + offset)));
     }
     return correlation.Value();
   }
@@ -285,8 +285,8 @@ class DepthEstimatorOf : public DepthEstimator {
 
 template <class Residual>
 inline constexpr bool kEstimatesDepth =
-    std::is_same_v<typename Residual::Channels, SampleChannels> &&
-    Residual::kExtraParameters == 0 && alignment::kPointwise<Residual>;
+    std::is_same_v<typename Residual::Channels, SampleChannels>&& Residual::kExtraParameters == 0 &&
+    alignment::kPointwise<Residual>;
 
 }  // namespace
 

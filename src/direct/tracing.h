@@ -45,7 +45,7 @@ struct View {
 /// What a refinement over several views has found.
 struct RefinedDepth {
   double inverse_depth = 0;
-  double information = 0;      ///< curvature of the cost, for residuals of unit scale
+  double information = 0;         ///< curvature of the cost, for residuals of unit scale
   std::vector<int> seen_by = {};  ///< positions among the views of those that agree
 };
 

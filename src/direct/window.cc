@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <map>
 
 #include <ceres/ceres.h>
@@ -95,8 +96,8 @@ class PriorCost : public ceres::CostFunction {
     Eigen::Map<VectorXd> r(residuals, root_.e.size());
     r = root_.e;
     for (size_t k = 0; k < parameter_block_sizes().size(); ++k) {
-      const auto S = root_.S.middleCols<kFrameParameters>(
-          kFrameParameters * static_cast<Eigen::Index>(k));
+      const auto S =
+          root_.S.middleCols<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
       r += S * Eigen::Map<const FrameParameters>(parameters[k]);
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
       if (jacobians && jacobians[k]) Eigen::Map<RowMajor>(jacobians[k], S.rows(), S.cols()) = S;
@@ -142,8 +143,8 @@ class WindowOptimizer::EngineOf : public Engine {
     ActivePoint* point = nullptr;
     int host = 0;
     double depth = 0;  ///< inverse depth, the solver's parameter
-    std::array<alignment::Vector2<float>, kPatchPixels> rays;
-    std::array<Reference, kPatchPixels> references;
+    std::array<alignment::Vector2<float>, kPatchPixels> rays = {};
+    std::array<Reference, kPatchPixels> references = {};
   };
 
   enum class Sight { kGood, kOutlier, kOutOfView };
@@ -154,8 +155,8 @@ class WindowOptimizer::EngineOf : public Engine {
     Sight sight = Sight::kGood;
     double mean_cost = 0;
     Rows residual = Rows::Zero();
-    FrameJacobian d_host, d_target;
-    Rows d_depth;
+    FrameJacobian d_host = FrameJacobian::Zero(), d_target = FrameJacobian::Zero();
+    Rows d_depth = Rows::Zero();
   };
 
   /// A residual block whose numbers are computed by Evaluate(), all at once.
@@ -164,15 +165,19 @@ class WindowOptimizer::EngineOf : public Engine {
     explicit ItemCost(const Item& item) : item_(item) {}
     bool Evaluate(double const* const* /*parameters*/, double* residuals,
                   double** jacobians) const override {
-      Eigen::Map<Rows>(residuals) = item_.residual;
+      Copy(item_.residual, residuals);
       if (!jacobians) return true;
-      if (jacobians[0]) Eigen::Map<FrameJacobian>(jacobians[0]) = item_.d_host;
-      if (jacobians[1]) Eigen::Map<FrameJacobian>(jacobians[1]) = item_.d_target;
-      if (jacobians[2]) Eigen::Map<Rows>(jacobians[2]) = item_.d_depth;
+      if (jacobians[0]) Copy(item_.d_host, jacobians[0]);
+      if (jacobians[1]) Copy(item_.d_target, jacobians[1]);
+      if (jacobians[2]) Copy(item_.d_depth, jacobians[2]);
       return true;
     }
 
    private:
+    template <class M>
+    static void Copy(const M& from, double* to) {
+      std::copy(from.data(), from.data() + from.size(), to);
+    }
     const Item& item_;
   };
 
@@ -253,12 +258,12 @@ class WindowOptimizer::EngineOf : public Engine {
         for (int k = 0; k < kPatchPixels; ++k) {
           const Eigen::Vector2f pixel = point.pixel + offsets_[k];
           patch.rays[k] = alignment::RayOf<float>(camera_, pixel);
-          patch.references[k] =
-              Residual::template MakeReference<float>(window[h]->image().template Sample<float>(pixel));
+          patch.references[k] = Residual::template MakeReference<float>(
+              window[h]->image().template Sample<float>(pixel));
         }
         for (const Observation& seen : point.observations)
-          items_.push_back({.patch = static_cast<int>(patches_.size()),
-                            .target = position.at(seen.target)});
+          items_.push_back(
+              {.patch = static_cast<int>(patches_.size()), .target = position.at(seen.target)});
         patches_.push_back(patch);
       }
     frames_.resize(window.size());
@@ -277,8 +282,8 @@ class WindowOptimizer::EngineOf : public Engine {
       const RelativeBrightness relative = Between(host.brightness, target.brightness);
       pair.residual.alpha = relative.alpha;
       pair.residual.beta = relative.beta;
-      pair.gain = std::exp(
-          Between(host.brightness_linearization, target.brightness_linearization).alpha);
+      pair.gain =
+          std::exp(Between(host.brightness_linearization, target.brightness_linearization).alpha);
       pair.target_b = target.brightness_linearization.b;
     }
     return pair;
@@ -294,9 +299,8 @@ class WindowOptimizer::EngineOf : public Engine {
   /// Everything that the solver asks for, from the window's state.
   void Evaluate(const Window& window, bool jacobians) {
     MakePairs(window);
-    ParallelForBatches(static_cast<int>(items_.size()), threads_, [&](int k) {
-      EvaluateItem(window, jacobians, items_[k]);
-    });
+    ParallelForBatches(static_cast<int>(items_.size()), threads_,
+                       [&](int k) { EvaluateItem(window, jacobians, items_[k]); });
   }
 
   void EvaluateItem(const Window& window, bool jacobians, Item& item) const {
@@ -322,9 +326,9 @@ class WindowOptimizer::EngineOf : public Engine {
     for (int k = 0; k < kPatchPixels; ++k) {
       const auto at = image.Sample(now[k].pixel);
       const Eigen::Matrix<double, kDim, 1> r =
-          inverse_scale * pair.residual
-                              .template Value<float>(at.value, now[k].A(), patch.references[k])
-                              .template cast<double>();
+          inverse_scale *
+          pair.residual.template Value<float>(at.value, now[k].A(), patch.references[k])
+              .template cast<double>();
       const double s = r.squaredNorm(), rho = loss.Rho(s);
       // The loss enters as a factor: its square times |r|^2 is rho.
       const double factor = s > 0 ? std::sqrt(rho / s) : 1;
@@ -392,7 +396,7 @@ class WindowOptimizer::EngineOf : public Engine {
                                 alignment::Vector2<float>::Zero()};
         if (!pair.now.At(input, point) || !image.Inside(point.pixel)) continue;
         norms[i][k] = pair.residual
-                          .template Value<float>(image.Sample(point.pixel).value, point.A(),
+                          .template Value<float>(image.Value(point.pixel), point.A(),
                                                  patch.references[k])
                           .squaredNorm();
       }
@@ -421,16 +425,14 @@ class WindowOptimizer::EngineOf : public Engine {
       problem.AddParameterBlock(frame.data(), kFrameParameters);
       ordering->AddElementToGroup(frame.data(), 1);
     }
-    std::vector<ItemCost> costs;
-    costs.reserve(items_.size());
+    std::deque<ItemCost> costs;  // cost functions cannot be moved
     for (const Item& item : items_) {
       costs.emplace_back(item);
       PointPatch& patch = patches_[item.patch];
       problem.AddResidualBlock(&costs.back(), nullptr, frames_[patch.host].data(),
                                frames_[item.target].data(), &patch.depth);
     }
-    std::vector<BrightnessCost> brightness;
-    brightness.reserve(window.size());
+    std::deque<BrightnessCost> brightness;
     for (size_t k = 0; k < window.size(); ++k) {
       brightness.emplace_back(*window[k],
                               exposures_known ? options_.sigma_a_known : options_.sigma_a,
@@ -442,7 +444,8 @@ class WindowOptimizer::EngineOf : public Engine {
     for (int id : prior.frames())
       for (size_t k = 0; k < window.size(); ++k)
         if (window[k]->id == id) prior_blocks.push_back(frames_[k].data());
-    if (prior_cost.num_residuals() > 0) problem.AddResidualBlock(&prior_cost, nullptr, prior_blocks);
+    if (prior_cost.num_residuals() > 0)
+      problem.AddResidualBlock(&prior_cost, nullptr, prior_blocks);
 
     const std::vector<FrameParameters> before = frames_;
     ceres::Solver::Options options;
@@ -499,8 +502,8 @@ class WindowOptimizer::EngineOf : public Engine {
       if (item.sight != Sight::kGood) continue;
       const Eigen::Index target = kFrameParameters * item.target;
       // Residuals as they would be at the linearisation.
-      const Rows r = item.residual - item.d_host * frames_[patch.host] -
-                     item.d_target * frames_[item.target];
+      const Rows r =
+          item.residual - item.d_host * frames_[patch.host] - item.d_target * frames_[item.target];
       constexpr int n = kFrameParameters;
       H.block<n, n>(host, host) += item.d_host.transpose() * item.d_host;
       H.block<n, n>(target, target) += item.d_target.transpose() * item.d_target;
@@ -534,8 +537,8 @@ namespace {
 
 template <class Residual>
 inline constexpr bool kOfWindows =
-    std::is_same_v<typename Residual::Channels, alignment::SampleChannels> &&
-    alignment::kPointwise<Residual>;
+    std::is_same_v<typename Residual::Channels, alignment::SampleChannels>&&
+        alignment::kPointwise<Residual>;
 
 }  // namespace
 

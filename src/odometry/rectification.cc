@@ -13,7 +13,7 @@
 namespace sgf::odometry {
 namespace {
 
-constexpr const char* kWhere = "stereo cameras";
+constexpr const char* kWhere = "cameras";
 
 // Bounds in normalised rectified coordinates (x/z, y/z).
 struct View {
@@ -100,7 +100,42 @@ void RequireSize(const cv::Mat& image, cv::Size size, const char* name) {
                                   image.rows, size.width, size.height));
 }
 
+RemapTable MakeTable(const Camera& raw, const Camera& ideal, const Eigen::Matrix3d& R_raw_ideal) {
+  cv::Mat1f x(ideal.height, ideal.width), y(x.size());
+  for (int v = 0; v < x.rows; ++v)
+    for (int u = 0; u < x.cols; ++u) {
+      const Eigen::Vector2d from = raw.Project(R_raw_ideal * ideal.Unproject({u, v}));
+      x(v, u) = static_cast<float>(from.x());
+      y(v, u) = static_cast<float>(from.y());
+    }
+  RemapTable table;
+  cv::convertMaps(x, y, table.position, table.fraction, CV_16SC2);
+  return table;
+}
+
+cv::Mat Remap(const cv::Mat& raw, const RemapTable& table) {
+  if (table.position.empty()) return raw;
+  cv::Mat rectified;
+  // Rounding may leave a position at the edge outside of the image by 1/64 px at most.
+  cv::remap(raw, rectified, table.position, table.fraction, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  return rectified;
+}
+
 }  // namespace
+
+Undistorter::Undistorter(const Camera& raw) : camera_(raw) {
+  raw.Check();
+  if (!raw.distorted()) return;
+  View view;
+  ShrinkToImage(raw, Eigen::Matrix3d::Identity(), view);
+  camera_ = FittingCamera(view, raw.width, raw.height);
+  table_ = MakeTable(raw, camera_, Eigen::Matrix3d::Identity());
+}
+
+cv::Mat Undistorter::Undistort(const cv::Mat& raw) const {
+  RequireSize(raw, {camera_.width, camera_.height}, "image");
+  return Remap(raw, table_);
+}
 
 StereoRectifier::StereoRectifier(const Camera& left, const Camera& right, const SE3& T_left_right)
     : camera_(left),
@@ -117,22 +152,8 @@ StereoRectifier::StereoRectifier(const Camera& left, const Camera& right, const 
   ShrinkToImage(left, R_left_rect_, view);
   ShrinkToImage(right, R_right_rect_, view);
   camera_ = FittingCamera(view, left.width, left.height);
-  left_table_ = MakeTable(left, R_left_rect_);
-  right_table_ = MakeTable(right, R_right_rect_);
-}
-
-StereoRectifier::RemapTable StereoRectifier::MakeTable(const Camera& raw,
-                                                       const Eigen::Matrix3d& R_raw_rect) const {
-  cv::Mat1f x(camera_.height, camera_.width), y(x.size());
-  for (int v = 0; v < x.rows; ++v)
-    for (int u = 0; u < x.cols; ++u) {
-      const Eigen::Vector2d from = raw.Project(R_raw_rect * camera_.Unproject({u, v}));
-      x(v, u) = static_cast<float>(from.x());
-      y(v, u) = static_cast<float>(from.y());
-    }
-  RemapTable table;
-  cv::convertMaps(x, y, table.position, table.fraction, CV_16SC2);
-  return table;
+  left_table_ = MakeTable(left, camera_, R_left_rect_);
+  right_table_ = MakeTable(right, camera_, R_right_rect_);
 }
 
 std::pair<cv::Mat, cv::Mat> StereoRectifier::Rectify(const cv::Mat& left,
@@ -140,14 +161,6 @@ std::pair<cv::Mat, cv::Mat> StereoRectifier::Rectify(const cv::Mat& left,
   RequireSize(left, left_size_, "left image");
   RequireSize(right, right_size_, "right image");
   return {Remap(left, left_table_), Remap(right, right_table_)};
-}
-
-cv::Mat StereoRectifier::Remap(const cv::Mat& raw, const RemapTable& table) {
-  if (table.position.empty()) return raw;
-  cv::Mat rectified;
-  // Rounding may leave a position at the edge outside of the image by 1/64 px at most.
-  cv::remap(raw, rectified, table.position, table.fraction, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  return rectified;
 }
 
 }  // namespace sgf::odometry

@@ -10,6 +10,31 @@
 
 namespace sgf::odometry {
 
+/// Where in a raw image each pixel of an ideal one comes from; empty where nothing is to be done.
+struct RemapTable {
+  cv::Mat position, fraction;  ///< as cv::convertMaps() makes them
+};
+
+/// Takes the distortion out of the images of one camera. The ideal camera has the same size, square
+/// pixels and the smallest focal length at which every pixel has a value. One without distortion is
+/// kept as it is, and so are its images.
+class Undistorter {
+ public:
+  /// @throws Error for a camera out of range (Camera::Check()).
+  explicit Undistorter(const Camera& raw);
+
+  /// The image that the ideal camera takes, bilinearly interpolated.
+  /// @throws Error for an image that is not of the camera's size.
+  cv::Mat Undistort(const cv::Mat& raw) const;
+
+  /// The ideal camera.
+  const Camera& camera() const { return camera_; }
+
+ private:
+  Camera camera_;
+  RemapTable table_;
+};
+
 /// Makes the rows of a calibrated stereo pair agree (Fusiello, Trucco, Verri: "A compact algorithm
 /// for rectification of stereo pairs", 2000). Both images are seen by one ideal pinhole camera from
 /// the two centres: its x axis points from the left to the right centre, its z axis is as close as
@@ -43,14 +68,6 @@ class StereoRectifier {
   const Eigen::Matrix3d& R_right_rect() const { return R_right_rect_; }
 
  private:
-  /// Where in a raw image each rectified pixel comes from; empty where nothing is to be done.
-  struct RemapTable {
-    cv::Mat position, fraction;  ///< as cv::convertMaps() makes them
-  };
-
-  RemapTable MakeTable(const Camera& raw, const Eigen::Matrix3d& R_raw_rect) const;
-  static cv::Mat Remap(const cv::Mat& raw, const RemapTable& table);
-
   Camera camera_;
   double baseline_m_ = 0;
   Eigen::Matrix3d R_left_rect_, R_right_rect_;

@@ -1,0 +1,338 @@
+// Direct sparse odometry with one camera.
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include <sgf/apps/cli.h>
+#include <sgf/apps/sequence_change.h>
+#include <sgf/core/provenance.h>
+#include <sgf/direct/direct_odometry.h>
+#include <sgf/eval/statistics.h>
+#include <sgf/io/atomic_file.h>
+#include <sgf/io/dso_calibration.h>
+#include <sgf/io/image.h>
+#include <sgf/io/odometry_dataset.h>
+#include <sgf/io/ply.h>
+#include <sgf/io/trajectory.h>
+#include <sgf/odometry/rectification.h>
+
+namespace sgf::apps {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DirectAppOptions {
+  direct::DirectOptions odometry;
+  RgbdOptions rgbd;
+  SequenceChange change;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    odometry.VisitFields(visit);
+    visit("rgbd", rgbd, "", "what an RGB-D sequence does not say");
+    visit("change", change, "", "change of light put on the images");
+  }
+};
+
+struct Arguments {
+  std::string sequence;
+  std::string output;
+  std::string layout;
+  std::string photometric;
+  std::string preset = "default";
+  int first = 0;
+  std::optional<int> frames;
+};
+
+/// Points against speed.
+void ApplyPreset(const std::string& name, direct::DirectOptions& options) {
+  const std::map<std::string, std::pair<int, int>> presets = {
+      {"fast", {800, 5}}, {"default", {1500, 7}}, {"dense", {3000, 7}}};
+  const auto preset = presets.find(name);
+  if (preset == presets.end())
+    throw Error("--preset", fmt::format("'{}' is unknown; known: default, dense, fast", name));
+  options.active_points = options.selection.points = preset->second.first;
+  options.keyframes = preset->second.second;
+  options.min_keyframes = std::min(options.min_keyframes, options.keyframes);
+}
+
+/// What a folder says of a camera's photometry.
+struct Photometry {
+  direct::PhotometricCalibration calibration;
+  std::map<std::int64_t, double> exposures_ms;  ///< by time; empty where not known
+};
+
+Photometry ReadPhotometry(const fs::path& folder) {
+  Photometry photometry;
+  bool any = false;
+  const auto has = [&](const char* name) {
+    const bool there = fs::exists(folder / name);
+    any = any || there;
+    return there;
+  };
+  if (has("pcalib.txt"))
+    photometry.calibration.inverse_response = ReadPcalib(folder / "pcalib.txt");
+  if (has("vignette.png")) photometry.calibration.vignette = ReadVignette(folder / "vignette.png");
+  if (has("times.txt"))
+    for (const FrameTime& frame : ReadFrameTimes(folder / "times.txt"))
+      photometry.exposures_ms[frame.time_ns] = frame.exposure_ms;
+  if (!any)
+    throw Error(folder.string(), "has none of pcalib.txt, vignette.png and times.txt");
+  return photometry;
+}
+
+/// Images of one camera of a sequence, without distortion.
+class FrameSource {
+ public:
+  FrameSource(OdometrySequence sequence, Photometry photometry, const SequenceChange& change)
+      : sequence_(std::move(sequence)),
+        photometry_(std::move(photometry)),
+        change_(change),
+        undistorter_(sequence_.cameras[0].camera) {
+    CheckChange(change);
+    cv::Mat1f& vignette = photometry_.calibration.vignette;
+    if (!vignette.empty()) vignette = undistorter_.Undistort(vignette);
+    for (const OdometryFrame& frame : sequence_.frames)
+      if (!photometry_.exposures_ms.empty() && !photometry_.exposures_ms.contains(frame.time_ns))
+        throw Error("times.txt", fmt::format("has no exposure of the frame at {} ns",
+                                             frame.time_ns));
+  }
+
+  const OdometrySequence& sequence() const { return sequence_; }
+  const Camera& camera() const { return undistorter_.camera(); }
+  const SE3& T_body_cam() const { return sequence_.cameras[0].T_body_cam; }
+  const direct::PhotometricCalibration& calibration() const { return photometry_.calibration; }
+  double clipped_share() const { return images_ ? clipped_ / images_ : 0; }
+
+  std::optional<double> ExposureMs(const OdometryFrame& frame) const {
+    if (photometry_.exposures_ms.empty()) return std::nullopt;
+    return photometry_.exposures_ms.at(frame.time_ns);
+  }
+
+  cv::Mat Load(const OdometryFrame& frame) {
+    cv::Mat1b image = ReadGrey(frame.left);
+    const Camera& raw = sequence_.cameras[0].camera;
+    if (image.size() != cv::Size(raw.width, raw.height))
+      throw Error(frame.left.string(), fmt::format("has {}x{} px, the camera {}x{}", image.cols,
+                                                   image.rows, raw.width, raw.height));
+    if (!ChangesNothing(change_))
+      image = ApplyChange(image, ChangeAt(change_, frame.time_ns - sequence_.frames[0].time_ns), 0);
+    clipped_ += ClippedShare(image);
+    ++images_;
+    return undistorter_.Undistort(image);
+  }
+
+ private:
+  OdometrySequence sequence_;
+  Photometry photometry_;
+  SequenceChange change_;
+  odometry::Undistorter undistorter_;
+  double clipped_ = 0;
+  int images_ = 0;
+};
+
+std::string_view Name(direct::DirectState state) {
+  for (const auto& [name, value] : EnumNames(state))
+    if (value == state) return name;
+  return "";
+}
+
+/// A line of JSON for everything that happens to the map.
+class EventLog {
+ public:
+  explicit EventLog(const fs::path& file) : file_(file) {}
+
+  void operator()(int frame, const direct::DirectFrameResult& result) {
+    if (result.new_map) Write(frame, result, "map", {});
+    if (result.new_keyframe)
+      Write(frame, result, "keyframe",
+            {{"active_points", result.active_points},
+             {"observations", result.window.observations},
+             {"outliers", result.window.outliers},
+             {"iterations", result.window.iterations},
+             {"scale", result.window.scale}});
+    if (result.state == direct::DirectState::kLost && state_ == direct::DirectState::kTracked)
+      Write(frame, result, "lost", {});
+    if (result.state == direct::DirectState::kTracked && state_ == direct::DirectState::kLost)
+      Write(frame, result, "found", {});
+    if (result.segment > segment_) Write(frame, result, "restart", {});
+    state_ = result.state;
+    segment_ = result.segment;
+  }
+
+  /// @throws Error if any line could not be written.
+  void Close() { WriteTextFile(file_, text_); }
+
+ private:
+  void Write(int frame, const direct::DirectFrameResult& result, const char* event,
+             nlohmann::ordered_json more) {
+    nlohmann::ordered_json line = {{"frame", frame},
+                                   {"time_ns", result.time_ns},
+                                   {"event", event},
+                                   {"segment", result.segment}};
+    if (!more.is_null()) line.update(more);
+    text_ += line.dump() + "\n";
+  }
+
+  fs::path file_;
+  std::string text_;
+  direct::DirectState state_ = direct::DirectState::kInitialising;
+  int segment_ = 0;
+};
+
+class Progress {
+ public:
+  void operator()(size_t done, size_t total, const direct::DirectFrameResult& result) {
+    if (result.state == direct::DirectState::kLost) spdlog::warn("frame {} is lost", done - 1);
+    const auto now = std::chrono::steady_clock::now();
+    if (done < total && now - last_ < std::chrono::seconds(2)) return;
+    last_ = now;
+    spdlog::info("{}/{} frames, {}, map {}, {} points, inliers {:.0f} %, {:.1f} ms", done, total,
+                 Name(result.state), result.segment, result.active_points,
+                 100 * result.inlier_share, 1e3 * result.times.total_s);
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+/// Which of the maps has most poses.
+int LongestSegment(const std::vector<direct::DirectPose>& poses) {
+  std::map<int, int> counts;
+  for (const direct::DirectPose& pose : poses) ++counts[pose.segment];
+  const auto longest = std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) {
+    return a.second < b.second;
+  });
+  return longest == counts.end() ? 0 : longest->first;
+}
+
+std::vector<TimedPose> OfSegment(const std::vector<direct::DirectPose>& poses, int segment) {
+  std::vector<TimedPose> result;
+  for (const direct::DirectPose& pose : poses)
+    if (pose.segment == segment) result.push_back({pose.time_ns, pose.T_world_cam});
+  return result;
+}
+
+void WriteFrames(const fs::path& file, const std::vector<direct::DirectFrameResult>& frames) {
+  std::string text =
+      "time_ns,state,segment,new_keyframe,inlier_share,overlap,active_points,hypotheses,"
+      "brightness_a,brightness_b\n";
+  for (const auto& f : frames)
+    text += fmt::format("{},{},{},{:d},{:.4f},{:.4f},{},{},{:.5f},{:.4f}\n", f.time_ns,
+                        Name(f.state), f.segment, f.new_keyframe, f.inlier_share, f.overlap,
+                        f.active_points, f.hypotheses, f.brightness.a, f.brightness.b);
+  WriteTextFile(file, text);
+}
+
+void WriteTimings(const fs::path& file, const std::vector<direct::DirectFrameResult>& frames) {
+  std::string text = "time_ns,image_ms,tracking_ms,tracing_ms,keyframe_ms,total_ms\n";
+  for (const auto& f : frames)
+    text += fmt::format("{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}\n", f.time_ns, 1e3 * f.times.image_s,
+                        1e3 * f.times.tracking_s, 1e3 * f.times.tracing_s, 1e3 * f.times.keyframe_s,
+                        1e3 * f.times.total_s);
+  WriteTextFile(file, text);
+}
+
+void WriteRunOptions(const fs::path& file, const DirectAppOptions& options) {
+  YAML::Node node;
+  node["options"] = WriteOptions(options);
+  node["build"]["version"] = BuildProvenance().version;
+  node["build"]["revision"] = BuildProvenance().git_revision;
+  WriteTextFile(file, YAML::Dump(node) + "\n");
+}
+
+void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
+  if (arguments.sequence.empty()) throw Error("", "expected a sequence's folder; see --help");
+  if (arguments.output.empty())
+    throw Error("--output", "is missing: name a folder for the results");
+  DirectAppOptions options;
+  ApplyPreset(arguments.preset, options.odometry);
+  flags.Apply(options);
+  std::optional<OdometryLayout> layout;
+  if (!arguments.layout.empty())
+    options_internal::ParseValue(YAML::Node(arguments.layout), "layout", "command line",
+                                 layout.emplace());
+  FrameSource source(
+      OpenOdometrySequence(arguments.sequence, layout, options.rgbd),
+      arguments.photometric.empty() ? Photometry{} : ReadPhotometry(arguments.photometric),
+      options.change);
+  direct::DirectOdometry odometry(source.camera(), source.calibration(), options.odometry);
+  const auto& all = source.sequence().frames;
+  if (arguments.first < 0 || arguments.first >= static_cast<int>(all.size()))
+    throw Error("--from", fmt::format("is {}; the sequence has {} frames", arguments.first, all.size()));
+  const auto frames = std::span(all).subspan(
+      arguments.first,
+      std::min<size_t>(arguments.frames.value_or(static_cast<int>(all.size())), all.size() - arguments.first));
+
+  const fs::path folder = arguments.output;
+  MakeFolder(folder);
+  EventLog events(folder / "events.jsonl");
+  Progress progress;
+  std::vector<direct::DirectFrameResult> results;
+  std::vector<direct::DirectPose> online;
+  std::vector<direct::MapPoint> points;
+  for (const OdometryFrame& frame : frames) {
+    const auto result = odometry.Process(frame.time_ns, source.Load(frame), source.ExposureMs(frame));
+    results.push_back(result);
+    if (result.state == direct::DirectState::kTracked)
+      online.push_back({frame.time_ns, result.segment, result.T_world_cam});
+    const auto done = odometry.TakeFinishedPoints();
+    points.insert(points.end(), done.begin(), done.end());
+    events(static_cast<int>(results.size()) - 1, result);
+    progress(results.size(), frames.size(), result);
+  }
+  const auto active = odometry.ActivePoints();
+  points.insert(points.end(), active.begin(), active.end());
+  const auto final = odometry.Trajectory();
+  const int segment = LongestSegment(final);
+  WriteTrajectory(folder / "trajectory.txt", OfSegment(final, segment));
+  WriteTrajectory(folder / "trajectory_online.txt", OfSegment(online, segment));
+  WriteFrames(folder / "frames.csv", results);
+  WriteTimings(folder / "timings.csv", results);
+  WriteRunOptions(folder / "options.yaml", options);
+  events.Close();
+  std::vector<double> total_ms;
+  double sum = 0;
+  for (const auto& r : results) total_ms.push_back(1e3 * r.times.total_s), sum += total_ms.back();
+  spdlog::info("{} of {} frames have a pose; {} points", OfSegment(final, segment).size(),
+               results.size(), points.size());
+  spdlog::info("a frame took {:.1f} ms in the median, {:.1f} in the mean, {:.1f} at most",
+               Median(total_ms), sum / static_cast<double>(total_ms.size()),
+               *std::max_element(total_ms.begin(), total_ms.end()));
+}
+
+}  // namespace
+}  // namespace sgf::apps
+
+int main(int argc, char** argv) {
+  using namespace sgf;
+  apps::Arguments arguments;
+  CLI::App app(
+      "Direct sparse odometry with one camera: writes trajectory.txt (TUM format: the camera's "
+      "pose at each frame's time, key-frames refined; of the map with most poses), "
+      "trajectory_online.txt (as known at frame time), points.ply, events.jsonl, frames.csv, "
+      "timings.csv, summary.json and options.yaml.",
+      "sgf_direct");
+  app.add_option("sequence", arguments.sequence, "FOLDER of the sequence");
+  app.add_option("-o,--output", arguments.output, "folder for the results (made if missing)");
+  app.add_option("--layout", arguments.layout,
+                 "layout of the sequence: " + options_internal::KnownNames(OdometryLayout{}) +
+                     " (default: what the folder looks like)");
+  app.add_option("--photometric", arguments.photometric,
+                 "folder with pcalib.txt, vignette.png and times.txt, as far as there are any");
+  app.add_option("--preset", arguments.preset, "fast, default or dense: points against speed")
+      ->capture_default_str();
+  app.add_option("--from", arguments.first, "first frame, counted from 0")->capture_default_str();
+  app.add_option("--frames", arguments.frames, "number of frames (default: all)");
+  const apps::OptionFlags flags(app, apps::DirectAppOptions{}, {});
+  return apps::RunTool(app, argc, argv, [&] { apps::RunDirect(arguments, flags); });
+}
