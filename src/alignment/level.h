@@ -52,6 +52,14 @@ class ChannelImage {
     return p.x() >= T(1) && p.y() >= T(1) && p.x() < T(cols_ - 2) && p.y() < T(rows_ - 2);
   }
 
+  /// Asks for the memory that Value() and Sample() will read at a place that is Inside().
+  template <class T>
+  void Prefetch(const Eigen::Matrix<T, 2, 1>& p) const {
+    const float* upper = At(static_cast<int>(p.y()), static_cast<int>(p.x()));
+    __builtin_prefetch(upper);
+    __builtin_prefetch(upper + size_t(cols_) * N);
+  }
+
   /// Channels at a place that is Inside(), without their derivatives.
   template <class T>
   Eigen::Array<T, N, 1> Value(const Eigen::Matrix<T, 2, 1>& p) const {

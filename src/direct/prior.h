@@ -12,6 +12,16 @@ namespace sgf::direct {
 inline constexpr int kFrameParameters = 8;
 using FrameParameters = Eigen::Matrix<double, kFrameParameters, 1>;
 
+/// x^T H x / 2 + b^T x as least squares, |S x + e|^2 / 2 up to a constant: S has a row for each
+/// direction that anything is known of.
+struct SquareRoot {
+  Eigen::MatrixXd S;
+  Eigen::VectorXd e;
+};
+
+/// @param H symmetric, without negative eigenvalues but for rounding.
+SquareRoot SquareRootOf(const Eigen::MatrixXd& H, const Eigen::VectorXd& b);
+
 /// A quadratic x^T H x / 2 + b^T x in the parameters x of key-frames, one after the other.
 class Prior {
  public:
@@ -30,14 +40,6 @@ class Prior {
 
   /// Takes a key-frame out, minimising over its parameters (Schur complement).
   void Marginalize(int id);
-
-  /// The same as least squares, |S x + e|^2 / 2 up to a constant: S has a row for each direction
-  /// that anything is known of.
-  struct SquareRoot {
-    Eigen::MatrixXd S;
-    Eigen::VectorXd e;
-  };
-  SquareRoot Root() const;
 
  private:
   std::vector<int> frames_;

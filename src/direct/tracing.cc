@@ -48,7 +48,8 @@ class DepthEstimatorOf : public DepthEstimator {
     }
     const float error_px = ErrorAcross(host.image(), point.pixel, line);
     if (bounded) {
-      if (2 * error_px > line.length) {
+      constexpr float kWorthwhile = 3;  // times its error a line has to be long
+      if (kWorthwhile * error_px > line.length) {
         point.status = TraceStatus::kUncertain;
         return;
       }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <deque>
 #include <map>
+#include <numeric>
 
 #include <ceres/ceres.h>
 #include <fmt/core.h>
@@ -23,6 +24,21 @@ using Warp = alignment::Se3DepthWarp<float>;
 
 constexpr int kPatchPixels = 8;
 constexpr double kHeld = 1e9;  // information of a parameter that is held
+
+using FrameBlock = Eigen::Matrix<double, kFrameParameters, kFrameParameters>;
+
+/// Normal equations in the parameters of all key-frames, inverse depths eliminated.
+struct Reduced {
+  MatrixXd H;
+  VectorXd b;
+};
+
+/// Normal equations in the relative parameters of a pair of key-frames.
+struct PairSum {
+  int host = -1, target = -1;
+  FrameBlock H = FrameBlock::Zero();
+  FrameParameters b = FrameParameters::Zero();
+};
 
 /// delta_rel = delta_cur - Ad(T_cur_ref) delta_ref for left perturbations of both poses.
 Matrix6d Adjoint(const SE3& T) {
@@ -87,7 +103,7 @@ class BrightnessCost : public ceres::SizedCostFunction<2, kFrameParameters> {
 /// The prior as a cost: |S x + e|^2 / 2.
 class PriorCost : public ceres::CostFunction {
  public:
-  explicit PriorCost(const Prior& prior) : root_(prior.Root()) {
+  explicit PriorCost(const Prior& prior) : root_(SquareRootOf(prior.H(), prior.b())) {
     set_num_residuals(static_cast<int>(root_.e.size()));
     mutable_parameter_block_sizes()->assign(prior.frames().size(), kFrameParameters);
   }
@@ -106,7 +122,7 @@ class PriorCost : public ceres::CostFunction {
   }
 
  private:
-  Prior::SquareRoot root_;
+  SquareRoot root_;
 };
 
 }  // namespace
@@ -123,26 +139,30 @@ class WindowOptimizer::Engine {
 template <class Residual>
 class WindowOptimizer::EngineOf : public Engine {
   static constexpr int kDim = Residual::kDim;
-  static constexpr int kRows = kPatchPixels * kDim;
-  static constexpr int kRelative = 7 + Residual::kExtraParameters;
   static constexpr bool kBrightness = Residual::kExtraParameters == 2;
+  /// Parameters of a point between two key-frames: relative pose, inverse depth and, where the
+  /// residual has one, relative brightness.
+  static constexpr int kRelative = 7 + Residual::kExtraParameters;
+  static constexpr int kDepth = 6;  ///< where the inverse depth is among them
   using Reference = typename Residual::template Reference<float>;
-  using FrameJacobian = Eigen::Matrix<double, kRows, kFrameParameters, Eigen::RowMajor>;
-  using Rows = Eigen::Matrix<double, kRows, 1>;
+  using Equations = alignment::NormalEquations<float, kRelative>;
 
   /// How one key-frame sees the points of another.
   struct Pair {
     Warp now, linear;  ///< where they are and where derivatives are taken
     Residual residual;
-    Matrix6d adjoint;
-    double gain = 1, target_b = 0;  ///< of the brightness where derivatives are taken
+    FrameBlock by_host, by_target;  ///< of relative pose and brightness by the key-frames' own
   };
 
   /// The pixels of a point.
   struct PointPatch {
     ActivePoint* point = nullptr;
     int host = 0;
-    double depth = 0;  ///< inverse depth, the solver's parameter
+    int first = 0, last = 0;  ///< its items
+    double depth = 0;         ///< inverse depth now
+    double linear_depth = 0;  ///< where it was linearised
+    double information = 0;   ///< H_dd
+    double slope = 0;         ///< b_d
     std::array<alignment::Vector2<float>, kPatchPixels> rays = {};
     std::array<Reference, kPatchPixels> references = {};
   };
@@ -153,40 +173,47 @@ class WindowOptimizer::EngineOf : public Engine {
   struct Item {
     int patch = 0, target = 0;
     Sight sight = Sight::kGood;
-    double mean_cost = 0;
-    Rows residual = Rows::Zero();
-    FrameJacobian d_host = FrameJacobian::Zero(), d_target = FrameJacobian::Zero();
-    Rows d_depth = Rows::Zero();
+    double cost = 0;  ///< sum of rho / 2 over the pixels; when out of view, as it was before
+    double information = 0, slope = 0;                 ///< its share of H_dd and b_d
+    FrameParameters across = FrameParameters::Zero();  ///< H_xd, x relative pose and brightness
   };
 
-  /// A residual block whose numbers are computed by Evaluate(), all at once.
-  class ItemCost : public ceres::SizedCostFunction<kRows, kFrameParameters, kFrameParameters, 1> {
+  /// The window as a cost function of its key-frames. Inverse depths follow them: they are where
+  /// the linearisation has its minimum for the key-frames' parameters, so that the solver has a
+  /// small dense problem (the Schur complement of what Ceres would eliminate itself from blocks
+  /// that take 13 MB to hand over). Residuals are the square root of the reduced equations and one
+  /// more that makes up for the rest of the cost.
+  class WindowCost : public ceres::CostFunction {
    public:
-    explicit ItemCost(const Item& item) : item_(item) {}
-    bool Evaluate(double const* const* /*parameters*/, double* residuals,
+    WindowCost(EngineOf& engine, Window& window) : engine_(engine), window_(window) {
+      mutable_parameter_block_sizes()->assign(window.size(), kFrameParameters);
+      set_num_residuals(kFrameParameters * static_cast<int>(window.size()) + 1);
+    }
+
+    bool Evaluate(double const* const* parameters, double* residuals,
                   double** jacobians) const override {
-      Copy(item_.residual, residuals);
-      if (!jacobians) return true;
-      if (jacobians[0]) Copy(item_.d_host, jacobians[0]);
-      if (jacobians[1]) Copy(item_.d_target, jacobians[1]);
-      if (jacobians[2]) Copy(item_.d_depth, jacobians[2]);
-      return true;
-    }
-
-   private:
-    template <class M>
-    static void Copy(const M& from, double* to) {
-      std::copy(from.data(), from.data() + from.size(), to);
-    }
-    const Item& item_;
-  };
-
-  class Callback : public ceres::EvaluationCallback {
-   public:
-    Callback(EngineOf& engine, Window& window) : engine_(engine), window_(window) {}
-    void PrepareForEvaluation(bool jacobians, bool /*new_point*/) override {
-      engine_.UseParameters(window_);
-      engine_.Evaluate(window_, jacobians);
+      engine_.MoveTo(window_, parameters);
+      Eigen::Map<VectorXd> r(residuals, num_residuals());
+      r.setZero();
+      const bool linearize = jacobians != nullptr;
+      const double cost = engine_.Evaluate(window_, linearize);
+      if (!linearize) {
+        r(0) = std::sqrt(2 * cost);
+        return std::isfinite(cost);
+      }
+      const Reduced reduced = engine_.Reduce(window_);
+      const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
+      r.head(root.e.size()) = root.e;
+      r(r.size() - 1) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
+      for (size_t k = 0; k < window_.size(); ++k) {
+        if (!jacobians[k]) continue;
+        using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
+        Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), kFrameParameters);
+        J.setZero();
+        J.topRows(root.S.rows()) = root.S.template middleCols<kFrameParameters>(
+            kFrameParameters * static_cast<Eigen::Index>(k));
+      }
+      return std::isfinite(cost);
     }
 
    private:
@@ -203,15 +230,13 @@ class WindowOptimizer::EngineOf : public Engine {
 
   WindowSummary Refine(Window& window, const Prior& prior, bool exposures_known) override {
     LinearizeHere(window);
-    Collect(window, [](const Keyframe&, const ActivePoint&) { return true; });
+    Collect(window, [](const ActivePoint&) { return true; });
     WindowSummary summary;
-    summary.scale = SetScale(window);
     if (items_.empty()) return summary;
+    SetScale(window);
     summary = Solve(window, prior, exposures_known);
     summary.scale = scale_;
-    if (!summary.usable) return summary;
-    Evaluate(window, true);
-    WriteBack(window, summary);
+    if (summary.usable) WriteBack(window, summary);
     return summary;
   }
 
@@ -221,26 +246,19 @@ class WindowOptimizer::EngineOf : public Engine {
     std::vector<const ActivePoint*> chosen;
     for (const auto& [host, point] : points) chosen.push_back(point);
     std::sort(chosen.begin(), chosen.end());
-    Collect(window, [&](const Keyframe&, const ActivePoint& point) {
+    Collect(window, [&](const ActivePoint& point) {
       return std::binary_search(chosen.begin(), chosen.end(), &point);
     });
     if (items_.empty()) return;
     Evaluate(window, true);
-    const Eigen::Index size = kFrameParameters * static_cast<Eigen::Index>(window.size());
-    MatrixXd H = MatrixXd::Zero(size, size);
-    VectorXd b = VectorXd::Zero(size);
-    for (size_t first = 0; first < items_.size();) {
-      size_t last = first;
-      while (last < items_.size() && items_[last].patch == items_[first].patch) ++last;
-      AddWithoutPoint(std::span(items_).subspan(first, last - first), H, b);
-      first = last;
-    }
+    const Reduced reduced = Reduce(window);
     std::vector<int> ids;
     for (const auto& frame : window) {
       ids.push_back(frame->id);
       frame->in_prior = true;
     }
-    prior.Add(ids, H, b);
+    // The prior's parameters count from the linearisation, those here from where it is now.
+    prior.Add(ids, reduced.H, reduced.b - reduced.H * x_);
   }
 
  private:
@@ -251,154 +269,292 @@ class WindowOptimizer::EngineOf : public Engine {
     std::map<int, int> position;
     for (size_t k = 0; k < window.size(); ++k) position[window[k]->id] = static_cast<int>(k);
     for (size_t h = 0; h < window.size(); ++h)
-      for (ActivePoint& point : window[h]->points) {
-        if (!chosen(*window[h], point)) continue;
-        PointPatch patch{.point = &point, .host = static_cast<int>(h)};
-        patch.depth = point.inverse_depth;
-        for (int k = 0; k < kPatchPixels; ++k) {
-          const Eigen::Vector2f pixel = point.pixel + offsets_[k];
-          patch.rays[k] = alignment::RayOf<float>(camera_, pixel);
-          patch.references[k] = Residual::template MakeReference<float>(
-              window[h]->image().template Sample<float>(pixel));
-        }
-        for (const Observation& seen : point.observations)
-          items_.push_back(
-              {.patch = static_cast<int>(patches_.size()), .target = position.at(seen.target)});
-        patches_.push_back(patch);
-      }
-    frames_.resize(window.size());
-    for (size_t k = 0; k < window.size(); ++k) frames_[k] = ParametersOf(*window[k]);
+      for (ActivePoint& point : window[h]->points)
+        if (chosen(point)) AddPatch(*window[h], static_cast<int>(h), position, point);
+    order_.resize(items_.size());
+    std::iota(order_.begin(), order_.end(), 0);
+    std::stable_sort(order_.begin(), order_.end(),
+                     [&](int a, int b) { return PairOf(a) < PairOf(b); });
+    x_.resize(kFrameParameters * static_cast<Eigen::Index>(window.size()));
+    for (size_t k = 0; k < window.size(); ++k) FrameOf(x_, k) = ParametersOf(*window[k]);
+    linear_x_ = x_;
   }
 
-  void UseParameters(Window& window) {
-    for (size_t k = 0; k < window.size(); ++k) SetParameters(frames_[k], *window[k]);
+  void AddPatch(const Keyframe& host, int h, const std::map<int, int>& position,
+                ActivePoint& point) {
+    PointPatch patch{.point = &point,
+                     .host = h,
+                     .first = static_cast<int>(items_.size()),
+                     .depth = point.inverse_depth,
+                     .linear_depth = point.inverse_depth};
+    for (int k = 0; k < kPatchPixels; ++k) {
+      const Eigen::Vector2f pixel = point.pixel + offsets_[k];
+      patch.rays[k] = alignment::RayOf<float>(camera_, pixel);
+      patch.references[k] =
+          Residual::template MakeReference<float>(host.image().template Sample<float>(pixel));
+    }
+    for (const Observation& seen : point.observations)
+      items_.push_back(
+          {.patch = static_cast<int>(patches_.size()), .target = position.at(seen.target)});
+    patch.last = static_cast<int>(items_.size());
+    patches_.push_back(patch);
+  }
+
+  /// Items of a pair are worked on together: they wait for the same image.
+  std::pair<int, int> PairOf(int item) const {
+    return {items_[item].target, patches_[items_[item].patch].host};
+  }
+
+  static auto FrameOf(VectorXd& x, size_t k) {
+    return x.segment<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
+  }
+
+  /// Takes on the key-frames' parameters, and the inverse depths that go with them.
+  void MoveTo(Window& window, double const* const* parameters) {
+    for (size_t k = 0; k < window.size(); ++k)
+      FrameOf(x_, k) = Eigen::Map<const FrameParameters>(parameters[k]);
+    MoveTo(window);
+  }
+
+  void MoveTo(Window& window) {
+    for (size_t k = 0; k < window.size(); ++k) SetParameters(FrameOf(x_, k), *window[k]);
+    if (pairs_.empty()) return;
+    const VectorXd step = x_ - linear_x_;
+    for (PointPatch& patch : patches_) {
+      if (!(patch.information > 0)) continue;
+      double slope = patch.slope;
+      for (int i = patch.first; i < patch.last; ++i) {
+        const Pair& pair = PairAt(window, i);
+        slope += items_[i].across.dot(pair.by_host * Segment(step, patch.host) +
+                                      pair.by_target * Segment(step, items_[i].target));
+      }
+      constexpr double kLeastShare = 0.2;  // an inverse depth stays positive
+      patch.depth = std::max(patch.linear_depth - slope / patch.information,
+                             kLeastShare * patch.linear_depth);
+    }
+  }
+
+  static FrameParameters Segment(const VectorXd& x, int frame) {
+    return x.segment<kFrameParameters>(kFrameParameters * frame);
+  }
+
+  const Pair& PairAt(const Window& window, int item) const {
+    return pairs_[patches_[items_[item].patch].host * window.size() + items_[item].target];
   }
 
   Pair MakePair(const Keyframe& host, const Keyframe& target) const {
     const SE3 T_now = target.T_cam_world * host.T_cam_world.Inverse();
     const SE3 T_linear = target.linearization * host.linearization.Inverse();
-    Pair pair{{camera_, T_now, 0}, {camera_, T_linear, 0}, {}, Adjoint(T_linear)};
+    Pair pair{
+        {camera_, T_now, 0}, {camera_, T_linear, 0}, {}, FrameBlock::Zero(), FrameBlock::Zero()};
+    pair.by_target.template topLeftCorner<6, 6>().setIdentity();
+    pair.by_host.template topLeftCorner<6, 6>() = -Adjoint(T_linear);
     if constexpr (kBrightness) {
       const RelativeBrightness relative = Between(host.brightness, target.brightness);
       pair.residual.alpha = relative.alpha;
       pair.residual.beta = relative.beta;
-      pair.gain =
-          std::exp(Between(host.brightness_linearization, target.brightness_linearization).alpha);
-      pair.target_b = target.brightness_linearization.b;
+      // alpha = a_h - a_t, beta = b_h - exp(alpha) b_t
+      const Brightness &a = host.brightness_linearization, &b = target.brightness_linearization;
+      const double gain = std::exp(Between(a, b).alpha);
+      pair.by_host.template bottomRightCorner<2, 2>() << 1, 0, -gain * b.b, 1;
+      pair.by_target.template bottomRightCorner<2, 2>() << -1, 0, gain * b.b, -gain;
     }
     return pair;
   }
 
   void MakePairs(const Window& window) {
-    const size_t n = window.size();
     pairs_.clear();
-    for (size_t h = 0; h < n; ++h)
-      for (size_t t = 0; t < n; ++t) pairs_.push_back(MakePair(*window[h], *window[t]));
+    for (const auto& host : window)
+      for (const auto& target : window) pairs_.push_back(MakePair(*host, *target));
   }
 
-  /// Everything that the solver asks for, from the window's state.
-  void Evaluate(const Window& window, bool jacobians) {
+  /// Cost of the window as it is now, and with `linearize` all that Reduce() and MoveTo() need.
+  double Evaluate(const Window& window, bool linearize) {
     MakePairs(window);
-    ParallelForBatches(static_cast<int>(items_.size()), threads_,
-                       [&](int k) { EvaluateItem(window, jacobians, items_[k]); });
+    const int count = static_cast<int>(items_.size());
+    const int batches = (count + kBatch - 1) / kBatch;
+    if (linearize) sums_.assign(batches, {});
+    ParallelFor(batches, threads_, [&](int batch) {
+      for (int k = batch * kBatch; k < std::min(count, (batch + 1) * kBatch); ++k) {
+        Item& item = items_[order_[k]];
+        const Pair& pair = PairAt(window, order_[k]);
+        Equations equations;
+        EvaluateItem(window[item.target]->image(), pair, linearize, item, equations);
+        if (linearize) Linearize(equations, item, SumOf(sums_[batch], order_[k]));
+      }
+    });
+    double cost = 0;
+    for (const Item& item : items_) cost += item.cost;
+    if (!linearize) return cost;
+    linear_x_ = x_;
+    for (PointPatch& patch : patches_) {
+      patch.linear_depth = patch.depth;
+      patch.information = patch.slope = 0;
+      for (int i = patch.first; i < patch.last; ++i) {
+        patch.information += items_[i].information;
+        patch.slope += items_[i].slope;
+      }
+    }
+    return cost;
   }
 
-  void EvaluateItem(const Window& window, bool jacobians, Item& item) const {
+  void EvaluateItem(const alignment::SampleChannels& image, const Pair& pair, bool linearize,
+                    Item& item, Equations& equations) const {
     const PointPatch& patch = patches_[item.patch];
-    const Pair& pair = pairs_[patch.host * window.size() + item.target];
-    const auto& image = window[item.target]->image();
+    const auto depth = static_cast<float>(patch.depth);
     const auto input = [&](int k) {
-      return Warp::Input{patch.rays[k], static_cast<float>(patch.depth),
-                         alignment::Vector2<float>::Zero()};
+      return Warp::Input{patch.rays[k], depth, alignment::Vector2<float>::Zero()};
     };
     std::array<Warp::Point, kPatchPixels> now;
-    item.sight = Sight::kGood;
-    for (int k = 0; k < kPatchPixels && item.sight == Sight::kGood; ++k)
-      if (!pair.now.At(input(k), now[k]) || !image.Inside(now[k].pixel))
-        item.sight = Sight::kOutOfView;
-    if (item.sight == Sight::kOutOfView) {  // keeps its cost: it must not pay to look away
-      SetConstant(item);
-      return;
-    }
-    const alignment::RobustLoss<double> loss{alignment::RobustKind::kHuber, 1};
-    const double inverse_scale = 1 / scale_;
-    double cost = 0;
     for (int k = 0; k < kPatchPixels; ++k) {
+      if (!pair.now.At(input(k), now[k]) || !image.Inside(now[k].pixel)) {
+        item.sight = Sight::kOutOfView;
+        return;
+      }
+      image.Prefetch(now[k].pixel);
+    }
+    const alignment::RobustLoss<float> loss{alignment::RobustKind::kHuber, 1};
+    const auto inverse_scale = static_cast<float>(1 / scale_);
+    float cost = 0;
+    for (int k = 0; k < kPatchPixels; ++k) {
+      if (!linearize) {
+        cost += loss.Rho(
+            (inverse_scale * pair.residual.template Value<float>(image.Value(now[k].pixel),
+                                                                 now[k].A(), patch.references[k]))
+                .squaredNorm());
+        continue;
+      }
       const auto at = image.Sample(now[k].pixel);
-      const Eigen::Matrix<double, kDim, 1> r =
+      const Eigen::Matrix<float, kDim, 1> r =
           inverse_scale *
-          pair.residual.template Value<float>(at.value, now[k].A(), patch.references[k])
-              .template cast<double>();
-      const double s = r.squaredNorm(), rho = loss.Rho(s);
-      // The loss enters as a factor: its square times |r|^2 is rho.
-      const double factor = s > 0 ? std::sqrt(rho / s) : 1;
-      item.residual.template segment<kDim>(kDim * k) = factor * r;
-      cost += rho;
-      if (!jacobians) continue;
+          pair.residual.template Value<float>(at.value, now[k].A(), patch.references[k]);
+      const float s = r.squaredNorm();
+      cost += loss.Rho(s);
       Warp::Point linear;
       if (!pair.linear.At(input(k), linear)) {
         item.sight = Sight::kOutOfView;
-        SetConstant(item);
         return;
       }
       Eigen::Matrix<float, kDim, kRelative> J;
       pair.residual.Linearize(at, linear, patch.references[k], J);
-      SetJacobian(pair, (loss.Weight(s) / factor * inverse_scale) * J.template cast<double>(), k,
-                  item);
+      equations.Add(r, inverse_scale * J, loss.Weight(s));
     }
-    item.mean_cost = cost / kPatchPixels;
-    if (item.mean_cost > options_.max_cost) {
-      item.sight = Sight::kOutlier;
-      item.residual.setConstant(std::sqrt(options_.max_cost * kPatchPixels / kRows));
-      SetConstant(item);
-    }
+    // Beyond the limit an observation costs the same however bad it is.
+    const double most = options_.max_cost * kPatchPixels;
+    item.sight = cost > most ? Sight::kOutlier : Sight::kGood;
+    item.cost = 0.5 * std::min<double>(cost, most);
   }
 
-  static void SetConstant(Item& item) {
-    item.d_host.setZero();
-    item.d_target.setZero();
-    item.d_depth.setZero();
+  /// The sum of an item's pair in a batch, whose items are sorted by pairs.
+  PairSum& SumOf(std::vector<PairSum>& sums, int item) const {
+    const int host = patches_[items_[item].patch].host, target = items_[item].target;
+    if (sums.empty() || sums.back().host != host || sums.back().target != target)
+      sums.push_back({.host = host, .target = target});
+    return sums.back();
   }
 
-  static void SetJacobian(const Pair& pair, const Eigen::Matrix<double, kDim, kRelative>& J, int k,
-                          Item& item) {
-    auto d_host = item.d_host.template middleRows<kDim>(kDim * k);
-    auto d_target = item.d_target.template middleRows<kDim>(kDim * k);
-    d_target.template leftCols<6>() = J.template leftCols<6>();
-    d_host.template leftCols<6>().noalias() = -J.template leftCols<6>() * pair.adjoint;
-    item.d_depth.template segment<kDim>(kDim * k) = J.col(6);
+  static void Linearize(const Equations& equations, Item& item, PairSum& sum) {
+    item.information = item.slope = 0;
+    item.across.setZero();
+    if (item.sight != Sight::kGood) return;
+    const Eigen::Matrix<double, kRelative, kRelative> H = equations.H();
+    const Eigen::Matrix<double, kRelative, 1> b = equations.b();
+    item.information = H(kDepth, kDepth);
+    item.slope = b(kDepth);
+    item.across.template head<6>() = H.template block<6, 1>(0, kDepth);
+    sum.H.template topLeftCorner<6, 6>() += H.template topLeftCorner<6, 6>();
+    sum.b.template head<6>() += b.template head<6>();
     if constexpr (kBrightness) {
-      // alpha = a_h - a_t, beta = b_h - exp(alpha) b_t
-      const auto d_a = J.col(7) - pair.gain * pair.target_b * J.col(8);
-      d_host.col(6) = d_a;
-      d_target.col(6) = -d_a;
-      d_host.col(7) = J.col(8);
-      d_target.col(7) = -pair.gain * J.col(8);
-    } else {
-      d_host.template rightCols<2>().setZero();
-      d_target.template rightCols<2>().setZero();
+      item.across.template tail<2>() = H.template block<2, 1>(7, kDepth);
+      sum.H.template topRightCorner<6, 2>() += H.template block<6, 2>(0, 7);
+      sum.H.template bottomLeftCorner<2, 6>() += H.template block<2, 6>(7, 0);
+      sum.H.template bottomRightCorner<2, 2>() += H.template block<2, 2>(7, 7);
+      sum.b.template tail<2>() += b.template tail<2>();
+    }
+  }
+
+  /// The last linearisation without inverse depths.
+  Reduced Reduce(const Window& window) const {
+    Reduced total{MatrixXd::Zero(x_.size(), x_.size()), VectorXd::Zero(x_.size())};
+    for (const auto& sums : sums_)
+      for (const PairSum& sum : sums) AddPair(window, sum, total);
+    const int count = static_cast<int>(patches_.size());
+    const int batches = (count + kBatch - 1) / kBatch;
+    std::vector<Reduced> parts(batches);
+    ParallelFor(batches, threads_, [&](int batch) {
+      parts[batch] = {MatrixXd::Zero(x_.size(), x_.size()), VectorXd::Zero(x_.size())};
+      for (int p = batch * kBatch; p < std::min(count, (batch + 1) * kBatch); ++p)
+        SubtractDepth(window, patches_[p], parts[batch]);
+    });
+    for (const Reduced& part : parts) {
+      total.H += part.H;
+      total.b += part.b;
+    }
+    total.H = total.H.template selfadjointView<Eigen::Lower>();
+    return total;
+  }
+
+  /// Adds to the lower triangle.
+  void AddPair(const Window& window, const PairSum& sum, Reduced& total) const {
+    constexpr int n = kFrameParameters;
+    const int host = sum.host, target = sum.target;
+    const Pair& pair = pairs_[host * window.size() + target];
+    total.b.segment<n>(n * host) += pair.by_host.transpose() * sum.b;
+    total.b.segment<n>(n * target) += pair.by_target.transpose() * sum.b;
+    total.H.block<n, n>(n * host, n * host) += pair.by_host.transpose() * sum.H * pair.by_host;
+    total.H.block<n, n>(n * target, n * target) +=
+        pair.by_target.transpose() * sum.H * pair.by_target;
+    const FrameBlock across = pair.by_target.transpose() * sum.H * pair.by_host;
+    if (target > host)
+      total.H.block<n, n>(n * target, n * host) += across;
+    else
+      total.H.block<n, n>(n * host, n * target) += across.transpose();
+  }
+
+  void SubtractDepth(const Window& window, const PointPatch& patch, Reduced& part) const {
+    if (!(patch.information > 0)) return;
+    constexpr int n = kFrameParameters;
+    std::array<int, 32> frames;
+    std::array<FrameParameters, 32> across;
+    int count = 1;
+    frames[0] = patch.host;
+    across[0].setZero();
+    for (int i = patch.first; i < patch.last; ++i) {
+      if (items_[i].sight != Sight::kGood) continue;
+      const Pair& pair = PairAt(window, i);
+      across[0] += pair.by_host.transpose() * items_[i].across;
+      frames[count] = items_[i].target;
+      across[count++] = pair.by_target.transpose() * items_[i].across;
+    }
+    const double inverse = 1 / patch.information;
+    for (int i = 0; i < count; ++i) {
+      part.b.segment<n>(n * frames[i]) -= inverse * patch.slope * across[i];
+      for (int j = 0; j < count; ++j)
+        if (frames[j] <= frames[i])
+          part.H.block<n, n>(n * frames[i], n * frames[j]).noalias() -=
+              (inverse * across[i]) * across[j].transpose();
     }
   }
 
   /// Standard deviation of the residuals in view.
-  double SetScale(const Window& window) {
-    scale_ = 1;
+  void SetScale(const Window& window) {
     MakePairs(window);
     std::vector<std::array<float, kPatchPixels>> norms(items_.size());
-    ParallelForBatches(static_cast<int>(items_.size()), threads_, [&](int i) {
+    ParallelForBatches(static_cast<int>(items_.size()), threads_, [&](int k) {
+      const int i = order_[k];
       const PointPatch& patch = patches_[items_[i].patch];
-      const Pair& pair = pairs_[patch.host * window.size() + items_[i].target];
+      const Pair& pair = PairAt(window, i);
       const auto& image = window[items_[i].target]->image();
       norms[i].fill(-1);
-      for (int k = 0; k < kPatchPixels; ++k) {
+      for (int p = 0; p < kPatchPixels; ++p) {
         Warp::Point point;
-        const Warp::Input input{patch.rays[k], static_cast<float>(patch.point->inverse_depth),
+        const Warp::Input input{patch.rays[p], static_cast<float>(patch.depth),
                                 alignment::Vector2<float>::Zero()};
         if (!pair.now.At(input, point) || !image.Inside(point.pixel)) continue;
-        norms[i][k] = pair.residual
-                          .template Value<float>(image.Value(point.pixel), point.A(),
-                                                 patch.references[k])
-                          .squaredNorm();
+        norms[i][p] =
+            pair.residual
+                .template Value<float>(image.Value(point.pixel), point.A(), patch.references[p])
+                .squaredNorm();
       }
     });
     std::vector<float> all;
@@ -406,51 +562,39 @@ class WindowOptimizer::EngineOf : public Engine {
       for (float norm : some)
         if (norm >= 0) all.push_back(norm);
     scale_ = alignment::MedianScale(std::span(all), kDim);
-    return scale_;
+    pairs_.clear();
   }
 
   WindowSummary Solve(Window& window, const Prior& prior, bool exposures_known) {
-    Callback callback(*this, window);
     ceres::Problem::Options problem_options;
     problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
-    problem_options.disable_all_safety_checks = true;
-    problem_options.evaluation_callback = &callback;
     ceres::Problem problem(problem_options);
-    auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-    for (PointPatch& patch : patches_) {
-      problem.AddParameterBlock(&patch.depth, 1);
-      ordering->AddElementToGroup(&patch.depth, 0);
+    std::vector<FrameParameters> frames(window.size());
+    std::vector<double*> blocks;
+    for (size_t k = 0; k < window.size(); ++k) {
+      frames[k] = FrameOf(x_, k);
+      blocks.push_back(frames[k].data());
     }
-    for (FrameParameters& frame : frames_) {
-      problem.AddParameterBlock(frame.data(), kFrameParameters);
-      ordering->AddElementToGroup(frame.data(), 1);
-    }
-    std::deque<ItemCost> costs;  // cost functions cannot be moved
-    for (const Item& item : items_) {
-      costs.emplace_back(item);
-      PointPatch& patch = patches_[item.patch];
-      problem.AddResidualBlock(&costs.back(), nullptr, frames_[patch.host].data(),
-                               frames_[item.target].data(), &patch.depth);
-    }
-    std::deque<BrightnessCost> brightness;
+    WindowCost window_cost(*this, window);
+    problem.AddResidualBlock(&window_cost, nullptr, blocks);
+    std::deque<BrightnessCost> brightness;  // cost functions cannot be moved
     for (size_t k = 0; k < window.size(); ++k) {
       brightness.emplace_back(*window[k],
                               exposures_known ? options_.sigma_a_known : options_.sigma_a,
                               exposures_known ? options_.sigma_b_known : options_.sigma_b);
-      problem.AddResidualBlock(&brightness.back(), nullptr, frames_[k].data());
+      problem.AddResidualBlock(&brightness.back(), nullptr, blocks[k]);
     }
-    PriorCost prior_cost(prior);
+    const PriorCost prior_cost(prior);
     std::vector<double*> prior_blocks;
     for (int id : prior.frames())
       for (size_t k = 0; k < window.size(); ++k)
-        if (window[k]->id == id) prior_blocks.push_back(frames_[k].data());
+        if (window[k]->id == id) prior_blocks.push_back(blocks[k]);
     if (prior_cost.num_residuals() > 0)
-      problem.AddResidualBlock(&prior_cost, nullptr, prior_blocks);
+      problem.AddResidualBlock(const_cast<PriorCost*>(&prior_cost), nullptr, prior_blocks);
 
-    const std::vector<FrameParameters> before = frames_;
+    const VectorXd before = x_;
     ceres::Solver::Options options;
-    options.linear_solver_type = ceres::DENSE_SCHUR;
-    options.linear_solver_ordering = ordering;
+    options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
     options.max_num_iterations = options_.max_iterations;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
@@ -460,67 +604,42 @@ class WindowOptimizer::EngineOf : public Engine {
     WindowSummary summary;
     summary.iterations = static_cast<int>(report.iterations.size());
     summary.usable = report.IsSolutionUsable();
-    for (const FrameParameters& x : frames_) summary.usable = summary.usable && x.allFinite();
-    if (!summary.usable) frames_ = before;
-    UseParameters(window);
+    for (size_t k = 0; k < window.size(); ++k) {
+      FrameOf(x_, k) = frames[k];
+      summary.usable = summary.usable && frames[k].allFinite();
+    }
+    if (!summary.usable) {
+      x_ = before;
+      for (PointPatch& patch : patches_) patch.information = 0;  // depths stay as well
+    }
+    MoveTo(window);
     return summary;
   }
 
   void WriteBack(Window& window, WindowSummary& summary) {
+    Evaluate(window, true);
     for (PointPatch& patch : patches_) {
-      patch.point->inverse_depth = patch.depth;
-      patch.point->observations.clear();
-      patch.point->variance = 0;
-    }
-    for (const Item& item : items_) {
-      ActivePoint& point = *patches_[item.patch].point;
-      if (item.sight != Sight::kGood) {
-        ++summary.outliers;
-        continue;
+      ActivePoint& point = *patch.point;
+      point.inverse_depth = patch.depth;
+      point.variance = patch.information > 0 ? 1 / patch.information : INFINITY;
+      point.observations.clear();
+      for (int i = patch.first; i < patch.last; ++i) {
+        if (items_[i].sight != Sight::kGood) continue;
+        point.observations.push_back(
+            {window[items_[i].target]->id, 2 * items_[i].cost / kPatchPixels});
       }
-      ++summary.observations;
-      point.observations.push_back({window[item.target]->id, item.mean_cost});
-      point.variance += item.d_depth.squaredNorm();  // information, turned round below
-      point.support = std::max(point.support, static_cast<int>(point.observations.size()));
+      const int seen = static_cast<int>(point.observations.size());
+      point.support = std::max(point.support, seen);
+      summary.observations += seen;
+      summary.outliers += patch.last - patch.first - seen;
     }
-    for (const auto& frame : window) {
-      for (ActivePoint& point : frame->points)
-        point.variance = point.variance > 0 ? 1 / point.variance : INFINITY;
+    for (const auto& frame : window)
       std::erase_if(frame->points, [](const ActivePoint& point) {
         return point.observations.empty() || !(point.inverse_depth > 0);
       });
-    }
   }
 
-  /// Adds what a point's observations say of the key-frames, its inverse depth eliminated.
-  void AddWithoutPoint(std::span<const Item> items, MatrixXd& H, VectorXd& b) const {
-    const PointPatch& patch = patches_[items.front().patch];
-    const Eigen::Index host = kFrameParameters * patch.host;
-    double H_d = 0, b_d = 0;
-    VectorXd H_fd = VectorXd::Zero(b.size());
-    for (const Item& item : items) {
-      if (item.sight != Sight::kGood) continue;
-      const Eigen::Index target = kFrameParameters * item.target;
-      // Residuals as they would be at the linearisation.
-      const Rows r =
-          item.residual - item.d_host * frames_[patch.host] - item.d_target * frames_[item.target];
-      constexpr int n = kFrameParameters;
-      H.block<n, n>(host, host) += item.d_host.transpose() * item.d_host;
-      H.block<n, n>(target, target) += item.d_target.transpose() * item.d_target;
-      const Eigen::Matrix<double, n, n> across = item.d_host.transpose() * item.d_target;
-      H.block<n, n>(host, target) += across;
-      H.block<n, n>(target, host) += across.transpose();
-      b.segment<n>(host) += item.d_host.transpose() * r;
-      b.segment<n>(target) += item.d_target.transpose() * r;
-      H_fd.segment<n>(host) += item.d_host.transpose() * item.d_depth;
-      H_fd.segment<n>(target) += item.d_target.transpose() * item.d_depth;
-      H_d += item.d_depth.squaredNorm();
-      b_d += item.d_depth.dot(r);
-    }
-    if (!(H_d > 0)) return;
-    H.noalias() -= H_fd * (H_fd / H_d).transpose();
-    b.noalias() -= H_fd * (b_d / H_d);
-  }
+  static constexpr int kBatch = 128;  // of items or points whose sums are taken together, in order
 
   Camera camera_;
   WindowOptions options_;
@@ -528,8 +647,10 @@ class WindowOptimizer::EngineOf : public Engine {
   std::span<const Eigen::Vector2f> offsets_;
   std::vector<PointPatch> patches_;
   std::vector<Item> items_;  ///< those of a point together
-  std::vector<FrameParameters> frames_;
+  std::vector<int> order_;   ///< of items, pair by pair
+  VectorXd x_, linear_x_;    ///< the key-frames' parameters, now and at the last linearisation
   std::vector<Pair> pairs_;  ///< host by host
+  std::vector<std::vector<PairSum>> sums_;  ///< of the last linearisation, by batches of items
   double scale_ = 1;
 };
 
