@@ -232,8 +232,26 @@ class Odometry::Impl {
     if (TrackFrom(last, predicted, options_.tracking_levels, result) ||
         TrackFrom(last, predicted, all, result) || TrackFrom(last, last_->T_world_cam, all, result))
       return;
+    if (last_->period_s == 0)
+      for (const SE3& motion : FirstMotions(last.keyframe))
+        if (TrackFrom(last, last_->T_world_cam * motion, all, result)) return;
     for (auto reference = references_.rbegin(); reference != references_.rend(); ++reference)
       if (TrackFrom(*reference, reference->keyframe.T_world_cam, all, result)) return;
+  }
+
+  /// What may have happened where no motion is known yet: ahead by shares of the scene's depth, as
+  /// vehicles go, straight or turning.
+  static std::vector<SE3> FirstMotions(const Keyframe& keyframe) {
+    std::vector<double> inverse_depths;
+    for (const alignment::ReferencePoint& point : keyframe.points)
+      inverse_depths.push_back(point.inverse_depth);
+    const auto middle = inverse_depths.begin() + static_cast<ptrdiff_t>(inverse_depths.size() / 2);
+    std::nth_element(inverse_depths.begin(), middle, inverse_depths.end());
+    std::vector<SE3> motions;
+    for (const double share : {0.05, 0.1})
+      for (const double yaw : {0., -0.04, 0.04})  // rad
+        motions.push_back({ExpSO3({0, yaw, 0}), {0, 0, share / *middle}});
+    return motions;
   }
 
   bool TrackFrom(const Reference& reference, const SE3& T_world_cam, int levels,

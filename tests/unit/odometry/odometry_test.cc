@@ -109,6 +109,21 @@ TEST(Odometry, StartsAnewAfterBeingLostForLong) {
             TrackingState::kLost);
 }
 
+TEST(Odometry, FindsAFirstMotionThatNothingPredicts) {
+  // With two levels no guess but a good one leads to it, and what is off is not believed.
+  OdometryOptions options = Options();
+  options.alignment.levels = 2;
+  options.alignment.min_inlier_share = 0.8;
+  Rehearsal rehearsal;
+  rehearsal.odometry = Odometry(kRig, options);
+  rehearsal.Depth(0);
+  const SE3 moved{ExpSO3({0, 0.04, 0}), {0, 0, 0.4}};
+  const auto view = rehearsal.world.Render(moved);
+  const FrameResult result = rehearsal.odometry.ProcessDepth(kPeriod, view.grey, view.depth_m);
+  EXPECT_EQ(result.state, TrackingState::kTracked);
+  EXPECT_LT((result.T_world_cam.p - moved.p).norm(), 0.02);
+}
+
 TEST(Odometry, TakesRotationsFromTheGyroscope) {
   // One iteration refines a prediction but does not find a turn of 14 degrees.
   const SE3 turned{ExpSO3({0, 0.25, 0}), {0, 0, 0}};
