@@ -85,8 +85,7 @@ Photometry ReadPhotometry(const fs::path& folder) {
   if (has("times.txt"))
     for (const FrameTime& frame : ReadFrameTimes(folder / "times.txt"))
       photometry.exposures_ms[frame.time_ns] = frame.exposure_ms;
-  if (!any)
-    throw Error(folder.string(), "has none of pcalib.txt, vignette.png and times.txt");
+  if (!any) throw Error(folder.string(), "has none of pcalib.txt, vignette.png and times.txt");
   return photometry;
 }
 
@@ -103,8 +102,8 @@ class FrameSource {
     if (!vignette.empty()) vignette = undistorter_.Undistort(vignette);
     for (const OdometryFrame& frame : sequence_.frames)
       if (!photometry_.exposures_ms.empty() && !photometry_.exposures_ms.contains(frame.time_ns))
-        throw Error("times.txt", fmt::format("has no exposure of the frame at {} ns",
-                                             frame.time_ns));
+        throw Error("times.txt",
+                    fmt::format("has no exposure of the frame at {} ns", frame.time_ns));
   }
 
   const OdometrySequence& sequence() const { return sequence_; }
@@ -209,9 +208,9 @@ class Progress {
 int LongestSegment(const std::vector<direct::DirectPose>& poses) {
   std::map<int, int> counts;
   for (const direct::DirectPose& pose : poses) ++counts[pose.segment];
-  const auto longest = std::max_element(counts.begin(), counts.end(), [](const auto& a, const auto& b) {
-    return a.second < b.second;
-  });
+  const auto longest =
+      std::max_element(counts.begin(), counts.end(),
+                       [](const auto& a, const auto& b) { return a.second < b.second; });
   return longest == counts.end() ? 0 : longest->first;
 }
 
@@ -242,6 +241,55 @@ void WriteTimings(const fs::path& file, const std::vector<direct::DirectFrameRes
   WriteTextFile(file, text);
 }
 
+/// Points of a map in world coordinates. Where a point's depth is not known well, its position's
+/// variance along the ray is that of the inverse depth carried over.
+void WritePoints(const fs::path& file, const std::vector<direct::MapPoint>& points, int segment) {
+  std::vector<PlyPoint> cloud;
+  for (const direct::MapPoint& point : points) {
+    if (point.segment != segment) continue;
+    const Eigen::Vector3f p = point.position.cast<float>();
+    const double relative =
+        point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
+    cloud.push_back(
+        {{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support});
+  }
+  WritePointsPly(
+      file, cloud,
+      "x right, y down, z forward of the first key-frame, units of the map; variance: of "
+      "the inverse depth over its square");
+}
+
+void WriteSummary(const fs::path& file, const FrameSource& source,
+                  const std::vector<direct::DirectFrameResult>& frames, size_t posed, int segment,
+                  size_t points) {
+  int keyframes = 0;
+  std::vector<double> total_ms;
+  double sum_ms = 0;
+  for (const direct::DirectFrameResult& f : frames) {
+    keyframes += f.new_keyframe;
+    total_ms.push_back(1e3 * f.times.total_s);
+    sum_ms += total_ms.back();
+  }
+  const double mean_ms = sum_ms / static_cast<double>(frames.size());
+  const double most_ms = *std::max_element(total_ms.begin(), total_ms.end());
+  const nlohmann::ordered_json summary = {{"sequence", source.sequence().name},
+                                          {"frames", frames.size()},
+                                          {"posed", posed},
+                                          {"segments", frames.back().segment + 1},
+                                          {"segment", segment},
+                                          {"keyframes", keyframes},
+                                          {"points", points},
+                                          {"clipped_share", source.clipped_share()},
+                                          {"median_ms", Median(total_ms)},
+                                          {"mean_ms", mean_ms},
+                                          {"most_ms", most_ms}};
+  WriteTextFile(file, summary.dump(2) + "\n");
+  spdlog::info("{} of {} frames have a pose, {} key-frames, {} points, {:.2f} % of pixels clipped",
+               posed, frames.size(), keyframes, points, 100 * source.clipped_share());
+  spdlog::info("a frame took {:.1f} ms in the median, {:.1f} ms in the mean, {:.1f} ms at most",
+               Median(total_ms), mean_ms, most_ms);
+}
+
 void WriteRunOptions(const fs::path& file, const DirectAppOptions& options) {
   YAML::Node node;
   node["options"] = WriteOptions(options);
@@ -268,10 +316,11 @@ void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
   direct::DirectOdometry odometry(source.camera(), source.calibration(), options.odometry);
   const auto& all = source.sequence().frames;
   if (arguments.first < 0 || arguments.first >= static_cast<int>(all.size()))
-    throw Error("--from", fmt::format("is {}; the sequence has {} frames", arguments.first, all.size()));
+    throw Error("--from",
+                fmt::format("is {}; the sequence has {} frames", arguments.first, all.size()));
   const auto frames = std::span(all).subspan(
-      arguments.first,
-      std::min<size_t>(arguments.frames.value_or(static_cast<int>(all.size())), all.size() - arguments.first));
+      arguments.first, std::min<size_t>(arguments.frames.value_or(static_cast<int>(all.size())),
+                                        all.size() - arguments.first));
 
   const fs::path folder = arguments.output;
   MakeFolder(folder);
@@ -281,7 +330,8 @@ void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
   std::vector<direct::DirectPose> online;
   std::vector<direct::MapPoint> points;
   for (const OdometryFrame& frame : frames) {
-    const auto result = odometry.Process(frame.time_ns, source.Load(frame), source.ExposureMs(frame));
+    const auto result =
+        odometry.Process(frame.time_ns, source.Load(frame), source.ExposureMs(frame));
     results.push_back(result);
     if (result.state == direct::DirectState::kTracked)
       online.push_back({frame.time_ns, result.segment, result.T_world_cam});
@@ -300,14 +350,9 @@ void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
   WriteTimings(folder / "timings.csv", results);
   WriteRunOptions(folder / "options.yaml", options);
   events.Close();
-  std::vector<double> total_ms;
-  double sum = 0;
-  for (const auto& r : results) total_ms.push_back(1e3 * r.times.total_s), sum += total_ms.back();
-  spdlog::info("{} of {} frames have a pose; {} points", OfSegment(final, segment).size(),
-               results.size(), points.size());
-  spdlog::info("a frame took {:.1f} ms in the median, {:.1f} in the mean, {:.1f} at most",
-               Median(total_ms), sum / static_cast<double>(total_ms.size()),
-               *std::max_element(total_ms.begin(), total_ms.end()));
+  WritePoints(folder / "points.ply", points, segment);
+  WriteSummary(folder / "summary.json", source, results, OfSegment(final, segment).size(), segment,
+               points.size());
 }
 
 }  // namespace

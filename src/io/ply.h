@@ -16,4 +16,19 @@ namespace sgf {
 void WriteMeshPly(const std::filesystem::path& path, std::span<const cv::Point3f> vertices,
                   std::span<const std::array<int, 3>> triangles, const std::string& comment);
 
+/// A point of a map.
+struct PlyPoint {
+  cv::Point3f position;
+  float grey = 0;      ///< grey levels; stored as red, green and blue, cut to 0 to 255
+  float variance = 0;  ///< of whatever the header's comment says
+  int support = 0;     ///< how many images it was seen in
+};
+
+/// Writes points as a binary PLY file: x, y, z and variance as float, red, green and blue as bytes,
+/// support as int.
+/// @param comment as for WriteMeshPly().
+/// @throws Error for a file that cannot be written.
+void WritePointsPly(const std::filesystem::path& path, std::span<const PlyPoint> points,
+                    const std::string& comment);
+
 }  // namespace sgf

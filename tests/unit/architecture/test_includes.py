@@ -16,7 +16,8 @@ ALLOWED = {
     "synth": {"core", "io", "eval"},
     "alignment": {"core", "metrics"},
     "odometry": {"core", "metrics", "stereo", "alignment"},
-    "apps": {"core", "metrics", "stereo", "alignment", "odometry", "io", "eval", "synth"},
+    "direct": {"core", "metrics", "alignment"},
+    "apps": {"core", "metrics", "stereo", "alignment", "odometry", "direct", "io", "eval", "synth"},
 }
 
 
@@ -53,9 +54,9 @@ def test_files_of_the_project_are_included_by_their_full_path():
 
 
 def test_only_the_places_meant_for_them_use_mrpt_and_ceres():
-    users = [
-        str(path.relative_to(PROJECT))
+    users = {
+        (folder_of(path), library)
         for path in SOURCES
-        if re.search(r"#\s*include\s*<(mrpt|ceres)/", path.read_text())
-    ]
-    assert not users
+        for library in re.findall(r"#\s*include\s*<(mrpt|ceres)/", path.read_text())
+    }
+    assert users == {("direct", "ceres")}
