@@ -318,6 +318,8 @@ void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
   if (arguments.first < 0 || arguments.first >= static_cast<int>(all.size()))
     throw Error("--from",
                 fmt::format("is {}; the sequence has {} frames", arguments.first, all.size()));
+  if (arguments.frames.value_or(1) < 1)
+    throw Error("--frames", fmt::format("is {}; it has to be positive", *arguments.frames));
   const auto frames = std::span(all).subspan(
       arguments.first, std::min<size_t>(arguments.frames.value_or(static_cast<int>(all.size())),
                                         all.size() - arguments.first));
@@ -378,6 +380,7 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--from", arguments.first, "first frame, counted from 0")->capture_default_str();
   app.add_option("--frames", arguments.frames, "number of frames (default: all)");
-  const apps::OptionFlags flags(app, apps::DirectAppOptions{}, {});
+  const apps::DirectAppOptions defaults;
+  const apps::OptionFlags flags(app, defaults, {});
   return apps::RunTool(app, argc, argv, [&] { apps::RunDirect(arguments, flags); });
 }

@@ -29,6 +29,7 @@ inline alignment::AlignmentOptions DefaultTracking() {
   alignment::AlignmentOptions options;
   options.residual = "photo_affine";
   options.pattern = alignment::Pattern::kPoint;
+  options.min_inlier_share = 0.6;  // directions of single gradients agree by chance more often
   return options;
 }
 
@@ -46,7 +47,7 @@ struct DirectOptions {
   double keyframe_flow = 0.045;
   double keyframe_parallax = 0.022;
   double keyframe_brightness = 0.5;
-  double keyframe_inliers = 0.6;
+  double keyframe_inliers = 0.8;
   int lost_frames = 5;
   int threads = 1;
 

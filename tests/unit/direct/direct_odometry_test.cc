@@ -52,7 +52,7 @@ struct Flight {
   }
 };
 
-cv::Mat1b Black() { return {240, 320, uint8_t{0}}; }
+cv::Mat1b Black() { return cv::Mat1b(240, 320, uint8_t{0}); }
 
 class FlightWith : public testing::TestWithParam<std::pair<const char*, const char*>> {};
 
@@ -170,7 +170,7 @@ TEST(DirectOdometry, RefusesBadInputAndGoesOn) {
 
 TEST(DirectOdometry, RefusesOptionsOutOfRange) {
   const auto refusal = [](const auto& change) {
-    DirectOptions options;
+    DirectOptions options = Options();
     change(options);
     return ErrorMessage([&] { DirectOdometry(kCamera, {}, options); });
   };
@@ -180,7 +180,7 @@ TEST(DirectOdometry, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refusal([](auto& o) { o.depth.residual = "lssd"; }), HasSubstr("estimate depth"));
   Camera distorted = kCamera;
   distorted.k1 = -0.2;
-  EXPECT_THAT(ErrorMessage([&] { DirectOdometry(distorted, {}, {}); }), HasSubstr("distortion"));
+  EXPECT_THAT(ErrorMessage([&] { DirectOdometry(distorted, {}, Options()); }), HasSubstr("distortion"));
 }
 
 }  // namespace
