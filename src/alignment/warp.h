@@ -325,8 +325,78 @@ struct Se3DepthWarp {
     return motion.At({u.ray, inverse_depth + u.inverse_depth, u.slope}, point);
   }
   void Update(const Eigen::Matrix<double, kParameters, 1>& delta) {
-    motion.Update(delta.head<6>());
+    motion.Update(delta.template head<6>());
     inverse_depth += static_cast<T>(delta(6));
+  }
+};
+
+/// The same, and the camera of both images: fx, fy, cx, cy (px) follow as parameters. They change
+/// the reference's rays as well.
+template <class T>
+struct Se3DepthCameraWarp {
+  using Scalar = T;
+  static constexpr int kParameters = 11;
+  using Parameters = Eigen::Matrix<T, kParameters, 1>;
+  using Input = PixelAtDepth<T>;  ///< with rays of the camera that the warp was made with
+
+  struct Point : Se3DepthWarp<T>::Point {
+    Vector2<T> ray;                     ///< of the reference
+    Vector3<T> R_per_px_x, R_per_px_y;  ///< d X / d pixel of the reference
+    Vector2<T> inv_f;
+
+    Parameters Along(const Vector2<T>& c) const {
+      Parameters along = AlongRays(this->BackToX(c));
+      along.template head<7>() = Base::Along(c);
+      along(7) += c.x() * this->x;
+      along(8) += c.y() * this->y;
+      along(9) += c.x();
+      along(10) += c.y();
+      return along;
+    }
+
+    /// As in Se3Warp, q changes with X; it and t have the focal lengths as factors as well.
+    Parameters Turn(const Vector2<T>& w, const Vector2<T>& v) const {
+      const Vector3<T> t = this->d_ux * w.x() + this->d_uy * w.y();
+      const Vector3<T> q = this->BackToX(v);
+      Parameters turn = AlongRays(this->HessianTimes(v, t));
+      turn.template head<7>() = Base::Turn(w, v);
+      turn(7) +=
+          v.x() * this->inv_z * (t.x() - this->x * t.z()) - q.dot(R_per_px_x) * w.x() * inv_f.x();
+      turn(8) +=
+          v.y() * this->inv_z * (t.y() - this->y * t.z()) - q.dot(R_per_px_y) * w.y() * inv_f.y();
+      return turn;
+    }
+
+   private:
+    using Base = typename Se3DepthWarp<T>::Point;
+    /// m^T dX/dp for the camera's parameters, zero for the others.
+    Parameters AlongRays(const Vector3<T>& m) const {
+      Parameters along = Parameters::Zero();
+      along(9) = -m.dot(R_per_px_x);
+      along(10) = -m.dot(R_per_px_y);
+      along(7) = along(9) * ray.x();
+      along(8) = along(10) * ray.y();
+      return along;
+    }
+  };
+
+  Se3DepthWarp<T> moved;
+  Vector2<T> ray_scale, ray_shift;  ///< from the first camera's rays to those of the present one
+
+  Se3DepthCameraWarp(const Camera& camera, const SE3& T_cur_ref, T inverse_depth,
+                     const Camera& of_rays)
+      : moved(camera, T_cur_ref, inverse_depth),
+        ray_scale(T(of_rays.fx / camera.fx), T(of_rays.fy / camera.fy)),
+        ray_shift(T((of_rays.cx - camera.cx) / camera.fx),
+                  T((of_rays.cy - camera.cy) / camera.fy)) {}
+
+  bool At(const Input& u, Point& point) const {
+    const auto& projector = moved.motion.projector;
+    point.ray = u.ray.cwiseProduct(ray_scale) + ray_shift;
+    point.R_per_px_x = projector.R_per_px_x;
+    point.R_per_px_y = projector.R_per_px_y;
+    point.inv_f = {T(1) / projector.fx, T(1) / projector.fy};
+    return moved.At({point.ray, u.inverse_depth, u.slope}, point);
   }
 };
 

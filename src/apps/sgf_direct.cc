@@ -1,8 +1,7 @@
 // Direct sparse odometry with one camera.
 
-#include <chrono>
+#include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <optional>
 #include <string>
@@ -13,14 +12,11 @@
 #include <spdlog/spdlog.h>
 
 #include <sgf/apps/cli.h>
-#include <sgf/apps/sequence_change.h>
-#include <sgf/core/provenance.h>
+#include <sgf/apps/sequence_run.h>
 #include <sgf/direct/direct_odometry.h>
 #include <sgf/eval/statistics.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/dso_calibration.h>
-#include <sgf/io/image.h>
-#include <sgf/io/odometry_dataset.h>
 #include <sgf/io/ply.h>
 #include <sgf/io/trajectory.h>
 #include <sgf/odometry/rectification.h>
@@ -44,13 +40,9 @@ struct DirectAppOptions {
 };
 
 struct Arguments {
-  std::string sequence;
-  std::string output;
-  std::string layout;
+  SequenceArguments run;
   std::string photometric;
   std::string preset = "default";
-  int first = 0;
-  std::optional<int> frames;
 };
 
 /// Points against speed.
@@ -71,7 +63,12 @@ struct Photometry {
   std::map<std::int64_t, double> exposures_ms;  ///< by time; empty where not known
 };
 
-Photometry ReadPhotometry(const fs::path& folder) {
+/// TUM's monocular sequences bring theirs with them.
+Photometry ReadPhotometry(const Arguments& arguments, OdometryLayout layout) {
+  const std::string& given = arguments.photometric;
+  const bool own = given.empty() && layout == OdometryLayout::kTumMono;
+  if (given == "none" || (given.empty() && !own)) return {};
+  const fs::path folder = own ? arguments.run.sequence : given;
   Photometry photometry;
   bool any = false;
   const auto has = [&](const char* name) {
@@ -85,7 +82,8 @@ Photometry ReadPhotometry(const fs::path& folder) {
   if (has("times.txt"))
     for (const FrameTime& frame : ReadFrameTimes(folder / "times.txt"))
       photometry.exposures_ms[frame.time_ns] = frame.exposure_ms;
-  if (!any) throw Error(folder.string(), "has none of pcalib.txt, vignette.png and times.txt");
+  if (!any && !own)
+    throw Error(folder.string(), "has none of pcalib.txt, vignette.png and times.txt");
   return photometry;
 }
 
@@ -95,9 +93,8 @@ class FrameSource {
   FrameSource(OdometrySequence sequence, Photometry photometry, const SequenceChange& change)
       : sequence_(std::move(sequence)),
         photometry_(std::move(photometry)),
-        change_(change),
+        load_(change, sequence_.frames[0].time_ns),
         undistorter_(sequence_.cameras[0].camera) {
-    CheckChange(change);
     cv::Mat1f& vignette = photometry_.calibration.vignette;
     if (!vignette.empty()) vignette = undistorter_.Undistort(vignette);
     for (const OdometryFrame& frame : sequence_.frames)
@@ -108,9 +105,8 @@ class FrameSource {
 
   const OdometrySequence& sequence() const { return sequence_; }
   const Camera& camera() const { return undistorter_.camera(); }
-  const SE3& T_body_cam() const { return sequence_.cameras[0].T_body_cam; }
   const direct::PhotometricCalibration& calibration() const { return photometry_.calibration; }
-  double clipped_share() const { return images_ ? clipped_ / images_ : 0; }
+  double clipped_share() const { return load_.clipped_share(); }
 
   std::optional<double> ExposureMs(const OdometryFrame& frame) const {
     if (photometry_.exposures_ms.empty()) return std::nullopt;
@@ -118,32 +114,15 @@ class FrameSource {
   }
 
   cv::Mat Load(const OdometryFrame& frame) {
-    cv::Mat1b image = ReadGrey(frame.left);
-    const Camera& raw = sequence_.cameras[0].camera;
-    if (image.size() != cv::Size(raw.width, raw.height))
-      throw Error(frame.left.string(), fmt::format("has {}x{} px, the camera {}x{}", image.cols,
-                                                   image.rows, raw.width, raw.height));
-    if (!ChangesNothing(change_))
-      image = ApplyChange(image, ChangeAt(change_, frame.time_ns - sequence_.frames[0].time_ns), 0);
-    clipped_ += ClippedShare(image);
-    ++images_;
-    return undistorter_.Undistort(image);
+    return undistorter_.Undistort(load_(frame.left, frame.time_ns, sequence_.cameras[0].camera));
   }
 
  private:
   OdometrySequence sequence_;
   Photometry photometry_;
-  SequenceChange change_;
+  ImageLoader load_;
   odometry::Undistorter undistorter_;
-  double clipped_ = 0;
-  int images_ = 0;
 };
-
-std::string_view Name(direct::DirectState state) {
-  for (const auto& [name, value] : EnumNames(state))
-    if (value == state) return name;
-  return "";
-}
 
 /// A line of JSON for everything that happens to the map.
 class EventLog {
@@ -188,21 +167,45 @@ class EventLog {
   int segment_ = 0;
 };
 
-class Progress {
- public:
-  void operator()(size_t done, size_t total, const direct::DirectFrameResult& result) {
-    if (result.state == direct::DirectState::kLost) spdlog::warn("frame {} is lost", done - 1);
-    const auto now = std::chrono::steady_clock::now();
-    if (done < total && now - last_ < std::chrono::seconds(2)) return;
-    last_ = now;
+void Report(ReportClock& clock, size_t done, size_t total,
+            const direct::DirectFrameResult& result) {
+  if (result.state == direct::DirectState::kLost) spdlog::warn("frame {} is lost", done - 1);
+  if (clock.Due(done, total))
     spdlog::info("{}/{} frames, {}, map {}, {} points, inliers {:.0f} %, {:.1f} ms", done, total,
-                 Name(result.state), result.segment, result.active_points,
+                 EnumName(result.state), result.segment, result.active_points,
                  100 * result.inlier_share, 1e3 * result.times.total_s);
-  }
+}
 
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+/// What a run has found.
+struct Run {
+  std::vector<direct::DirectFrameResult> frames;
+  std::vector<direct::DirectPose> online, final;
+  std::vector<direct::MapPoint> points;
+  Camera camera;  ///< as it was known in the end
 };
+
+Run TrackSequence(FrameSource& source, std::span<const OdometryFrame> frames,
+                  direct::DirectOdometry odometry, EventLog& events) {
+  Run run;
+  ReportClock clock;
+  const auto keep = [&](const std::vector<direct::MapPoint>& points) {
+    run.points.insert(run.points.end(), points.begin(), points.end());
+  };
+  for (const OdometryFrame& frame : frames) {
+    const auto result =
+        odometry.Process(frame.time_ns, source.Load(frame), source.ExposureMs(frame));
+    run.frames.push_back(result);
+    if (result.state == direct::DirectState::kTracked)
+      run.online.push_back({frame.time_ns, result.segment, result.T_world_cam});
+    keep(odometry.TakeFinishedPoints());
+    events(static_cast<int>(run.frames.size()) - 1, result);
+    Report(clock, run.frames.size(), frames.size(), result);
+  }
+  keep(odometry.ActivePoints());
+  run.final = odometry.Trajectory();
+  run.camera = odometry.camera();
+  return run;
+}
 
 /// Which of the maps has most poses.
 int LongestSegment(const std::vector<direct::DirectPose>& poses) {
@@ -227,7 +230,7 @@ void WriteFrames(const fs::path& file, const std::vector<direct::DirectFrameResu
       "brightness_a,brightness_b\n";
   for (const auto& f : frames)
     text += fmt::format("{},{},{},{:d},{:.4f},{:.4f},{},{},{:.5f},{:.4f}\n", f.time_ns,
-                        Name(f.state), f.segment, f.new_keyframe, f.inlier_share, f.overlap,
+                        EnumName(f.state), f.segment, f.new_keyframe, f.inlier_share, f.overlap,
                         f.active_points, f.hypotheses, f.brightness.a, f.brightness.b);
   WriteTextFile(file, text);
 }
@@ -259,9 +262,10 @@ void WritePoints(const fs::path& file, const std::vector<direct::MapPoint>& poin
       "the inverse depth over its square");
 }
 
-void WriteSummary(const fs::path& file, const FrameSource& source,
-                  const std::vector<direct::DirectFrameResult>& frames, size_t posed, int segment,
-                  size_t points) {
+void WriteSummary(const fs::path& file, const FrameSource& source, const Run& run, int segment) {
+  const auto& frames = run.frames;
+  const Camera& c = run.camera;
+  const size_t posed = OfSegment(run.final, segment).size(), points = run.points.size();
   int keyframes = 0;
   std::vector<double> total_ms;
   double sum_ms = 0;
@@ -279,6 +283,7 @@ void WriteSummary(const fs::path& file, const FrameSource& source,
                                           {"segment", segment},
                                           {"keyframes", keyframes},
                                           {"points", points},
+                                          {"intrinsics_px", {c.fx, c.fy, c.cx, c.cy}},
                                           {"clipped_share", source.clipped_share()},
                                           {"median_ms", Median(total_ms)},
                                           {"mean_ms", mean_ms},
@@ -290,71 +295,30 @@ void WriteSummary(const fs::path& file, const FrameSource& source,
                Median(total_ms), mean_ms, most_ms);
 }
 
-void WriteRunOptions(const fs::path& file, const DirectAppOptions& options) {
-  YAML::Node node;
-  node["options"] = WriteOptions(options);
-  node["build"]["version"] = BuildProvenance().version;
-  node["build"]["revision"] = BuildProvenance().git_revision;
-  WriteTextFile(file, YAML::Dump(node) + "\n");
-}
-
 void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
-  if (arguments.sequence.empty()) throw Error("", "expected a sequence's folder; see --help");
-  if (arguments.output.empty())
-    throw Error("--output", "is missing: name a folder for the results");
   DirectAppOptions options;
   ApplyPreset(arguments.preset, options.odometry);
   flags.Apply(options);
-  std::optional<OdometryLayout> layout;
-  if (!arguments.layout.empty())
-    options_internal::ParseValue(YAML::Node(arguments.layout), "layout", "command line",
-                                 layout.emplace());
-  FrameSource source(
-      OpenOdometrySequence(arguments.sequence, layout, options.rgbd),
-      arguments.photometric.empty() ? Photometry{} : ReadPhotometry(arguments.photometric),
-      options.change);
+  OdometrySequence sequence = arguments.run.Open(options.rgbd);
+  Photometry photometry = ReadPhotometry(arguments, sequence.layout);
+  FrameSource source(std::move(sequence), std::move(photometry), options.change);
+  const auto frames = arguments.run.Chosen(source.sequence());
   direct::DirectOdometry odometry(source.camera(), source.calibration(), options.odometry);
-  const auto& all = source.sequence().frames;
-  if (arguments.first < 0 || arguments.first >= static_cast<int>(all.size()))
-    throw Error("--from",
-                fmt::format("is {}; the sequence has {} frames", arguments.first, all.size()));
-  if (arguments.frames.value_or(1) < 1)
-    throw Error("--frames", fmt::format("is {}; it has to be positive", *arguments.frames));
-  const auto frames = std::span(all).subspan(
-      arguments.first, std::min<size_t>(arguments.frames.value_or(static_cast<int>(all.size())),
-                                        all.size() - arguments.first));
-
-  const fs::path folder = arguments.output;
-  MakeFolder(folder);
+  const fs::path folder = arguments.run.output;
+  MakeFolder(folder);  // before the work, which would be lost
+  if (const int skipped = source.sequence().skipped_frames)
+    spdlog::warn("left out: {} x frame with a missing file", skipped);
   EventLog events(folder / "events.jsonl");
-  Progress progress;
-  std::vector<direct::DirectFrameResult> results;
-  std::vector<direct::DirectPose> online;
-  std::vector<direct::MapPoint> points;
-  for (const OdometryFrame& frame : frames) {
-    const auto result =
-        odometry.Process(frame.time_ns, source.Load(frame), source.ExposureMs(frame));
-    results.push_back(result);
-    if (result.state == direct::DirectState::kTracked)
-      online.push_back({frame.time_ns, result.segment, result.T_world_cam});
-    const auto done = odometry.TakeFinishedPoints();
-    points.insert(points.end(), done.begin(), done.end());
-    events(static_cast<int>(results.size()) - 1, result);
-    progress(results.size(), frames.size(), result);
-  }
-  const auto active = odometry.ActivePoints();
-  points.insert(points.end(), active.begin(), active.end());
-  const auto final = odometry.Trajectory();
-  const int segment = LongestSegment(final);
-  WriteTrajectory(folder / "trajectory.txt", OfSegment(final, segment));
-  WriteTrajectory(folder / "trajectory_online.txt", OfSegment(online, segment));
-  WriteFrames(folder / "frames.csv", results);
-  WriteTimings(folder / "timings.csv", results);
-  WriteRunOptions(folder / "options.yaml", options);
+  const Run run = TrackSequence(source, frames, std::move(odometry), events);
+  const int segment = LongestSegment(run.final);
+  WriteTrajectory(folder / "trajectory.txt", OfSegment(run.final, segment));
+  WriteTrajectory(folder / "trajectory_online.txt", OfSegment(run.online, segment));
+  WriteFrames(folder / "frames.csv", run.frames);
+  WriteTimings(folder / "timings.csv", run.frames);
+  WriteRunOptions(folder / "options.yaml", WriteOptions(options));
   events.Close();
-  WritePoints(folder / "points.ply", points, segment);
-  WriteSummary(folder / "summary.json", source, results, OfSegment(final, segment).size(), segment,
-               points.size());
+  WritePoints(folder / "points.ply", run.points, segment);
+  WriteSummary(folder / "summary.json", source, run, segment);
 }
 
 }  // namespace
@@ -369,17 +333,13 @@ int main(int argc, char** argv) {
       "trajectory_online.txt (as known at frame time), points.ply, events.jsonl, frames.csv, "
       "timings.csv, summary.json and options.yaml.",
       "sgf_direct");
-  app.add_option("sequence", arguments.sequence, "FOLDER of the sequence");
-  app.add_option("-o,--output", arguments.output, "folder for the results (made if missing)");
-  app.add_option("--layout", arguments.layout,
-                 "layout of the sequence: " + options_internal::KnownNames(OdometryLayout{}) +
-                     " (default: what the folder looks like)");
-  app.add_option("--photometric", arguments.photometric,
-                 "folder with pcalib.txt, vignette.png and times.txt, as far as there are any");
+  arguments.run.AddTo(app);
+  app.add_option(
+      "--photometric", arguments.photometric,
+      "folder with pcalib.txt, vignette.png and times.txt, as far as there are any; none "
+      "for none (default: the sequence's own in TUM's monocular layout, else none)");
   app.add_option("--preset", arguments.preset, "fast, default or dense: points against speed")
       ->capture_default_str();
-  app.add_option("--from", arguments.first, "first frame, counted from 0")->capture_default_str();
-  app.add_option("--frames", arguments.frames, "number of frames (default: all)");
   const apps::DirectAppOptions defaults;
   const apps::OptionFlags flags(app, defaults, {});
   return apps::RunTool(app, argc, argv, [&] { apps::RunDirect(arguments, flags); });

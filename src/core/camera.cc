@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -13,8 +14,25 @@ namespace sgf {
 
 namespace {
 
+/// Distort() for a fisheye lens: the image's radius grows with the angle to the axis.
+Eigen::Vector2d DistortFisheye(double omega, const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
+  const double widest = 2 * std::tan(omega / 2);
+  const double r = n.norm();
+  constexpr double kOnAxis = 1e-8;
+  const double scale = r < kOnAxis ? widest / omega : std::atan(r * widest) / (omega * r);
+  if (J) {
+    *J = scale * Eigen::Matrix2d::Identity();
+    if (r >= kOnAxis) {
+      const double slope = widest / (omega * (1 + r * r * widest * widest));
+      *J += (slope - scale) / (r * r) * n * n.transpose();
+    }
+  }
+  return scale * n;
+}
+
 /// Distorted normalised coordinates and, if asked for, their derivative by the undistorted ones.
 Eigen::Vector2d Distort(const Camera& c, const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
+  if (c.omega != 0) return DistortFisheye(c.omega, n, J);
   const double x = n.x(), y = n.y(), r2 = n.squaredNorm();
   const double radial = 1 + r2 * (c.k1 + r2 * c.k2);
   if (J) {
@@ -72,9 +90,13 @@ void Camera::Check() const {
   if (!(fx > 0 && fy > 0))
     throw Error("camera",
                 fmt::format("focal lengths are {}, {} px; they have to be positive", fx, fy));
-  for (const double value : {fx, fy, cx, cy, k1, k2, p1, p2})
+  for (const double value : {fx, fy, cx, cy, k1, k2, p1, p2, omega})
     if (!std::isfinite(value))
       throw Error("camera", fmt::format("a parameter is {}; all have to be finite", value));
+  if (!(omega >= 0 && omega < std::numbers::pi))
+    throw Error("camera", fmt::format("omega is {} rad; it has to be in [0, pi)", omega));
+  if (omega != 0 && (k1 != 0 || k2 != 0 || p1 != 0 || p2 != 0))
+    throw Error("camera", "has omega and another distortion as well");
 }
 
 }  // namespace sgf

@@ -45,6 +45,14 @@ struct OptionDoc {
   std::string text;
 };
 
+/// The name of an enum's value, as EnumNames() has it.
+template <class T>
+std::string EnumName(T value) {
+  for (const auto& [name, v] : EnumNames(value))
+    if (v == value) return name;
+  return "?";
+}
+
 namespace options_internal {
 
 inline std::string At(const std::string& file, const YAML::Node& node) {
@@ -60,9 +68,7 @@ std::string FormatValue(const T& value) {
     });
     return "{" + text + "}";
   } else if constexpr (std::is_enum_v<T>) {
-    for (const auto& [name, v] : EnumNames(value))
-      if (v == value) return name;
-    return "?";
+    return EnumName(value);
   } else if constexpr (std::is_same_v<T, std::string>) {
     return value;
   } else if constexpr (requires { typename T::value_type; }) {

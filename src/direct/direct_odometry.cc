@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <chrono>
+#include <climits>
 #include <cmath>
 #include <deque>
 
@@ -8,6 +8,7 @@
 #include <sgf/alignment/warp.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/stopwatch.h>
 #include <sgf/direct/direct_odometry.h>
 
 namespace sgf::direct {
@@ -15,19 +16,6 @@ namespace {
 
 using alignment::ReferencePoint;
 using Eigen::Vector2f, Eigen::Vector3d;
-
-class Stopwatch {
- public:
-  double Lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const std::chrono::duration<double> elapsed = now - start_;
-    start_ = now;
-    return elapsed.count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// Where a pixel of known inverse depth is in another camera's image.
 struct Seen {
@@ -175,6 +163,8 @@ class DirectOdometry::Impl {
     return poses;
   }
 
+  const Camera& camera() const { return camera_; }
+
   std::vector<MapPoint> TakeFinishedPoints() { return std::exchange(finished_, {}); }
 
   std::vector<MapPoint> ActivePoints() const {
@@ -290,8 +280,8 @@ class DirectOdometry::Impl {
 
   void AddImmature(Keyframe& frame) {
     for (const cv::Point& p : selector_(frame.image()))
-      frame.immature.push_back(
-          {.pixel = Vector2f(static_cast<float>(p.x), static_cast<float>(p.y))});
+      frame.immature.push_back(MakeImmaturePoint(
+          frame.image(), Vector2f(static_cast<float>(p.x), static_cast<float>(p.y))));
   }
 
   /// The first two key-frames, from the waiting frames' motion.
@@ -413,7 +403,8 @@ class DirectOdometry::Impl {
   void Trace(Keyframe& host, const alignment::SampleChannels& image, const SE3& T_target_host,
              const RelativeBrightness& relative) const {
     ParallelForBatches(static_cast<int>(host.immature.size()), options_.threads, [&](int k) {
-      depth_->Trace(host, image, T_target_host, relative, host.immature[k]);
+      ImmaturePoint& point = host.immature[k];
+      if (!GivenUp(point)) depth_->Trace(host, image, T_target_host, relative, point);
     });
   }
 
@@ -464,6 +455,12 @@ class DirectOdometry::Impl {
 
   // --- Key-frames ---
 
+  void UseCamera(const Camera& camera) {
+    camera_ = camera;
+    aligner_ = alignment::DirectAligner(camera, options_.tracking);
+    depth_ = MakeDepthEstimator(camera, options_.depth);
+  }
+
   int CountActive() const {
     int count = 0;
     for (const auto& frame : window_) count += static_cast<int>(frame->points.size());
@@ -472,6 +469,7 @@ class DirectOdometry::Impl {
 
   WindowSummary Refine() {
     const WindowSummary summary = optimizer_->Refine(window_, first_exposure_ms_.has_value());
+    if (options_.window.sigma_intrinsics > 0) UseCamera(optimizer_->camera());
     StorePoses();
     return summary;
   }
@@ -544,6 +542,9 @@ class DirectOdometry::Impl {
     for (const auto& host : window_) Prune(*host);
   }
 
+  /// Twice not found where it has to be: moving, or hidden (DSO's rule).
+  static bool GivenUp(const ImmaturePoint& point) { return point.outliers >= 2; }
+
   bool Mature(const ImmaturePoint& point) const {
     constexpr float kMostInterval = 8;  // px
     return point.found > 0 && point.quality >= options_.depth.min_quality &&
@@ -566,8 +567,7 @@ class DirectOdometry::Impl {
   void Promote(const Candidate& candidate) {
     ImmaturePoint& point = candidate.host->immature[candidate.index];
     const std::vector<View> views = ViewsOf(*candidate.host, point);
-    point.status = TraceStatus::kOutlier;  // tried: leaves in any case
-    point.found = 0;
+    point.outliers = INT_MAX;  // tried: leaves in any case
     if (candidate.refined.seen_by.empty()) return;
     ActivePoint active{.pixel = point.pixel, .inverse_depth = candidate.refined.inverse_depth};
     for (int k : candidate.refined.seen_by) active.observations.push_back({views[k].target->id});
@@ -580,7 +580,7 @@ class DirectOdometry::Impl {
     if (host.id == newest.id) return;
     const SE3 T = newest.T_cam_world * host.T_cam_world.Inverse();
     std::erase_if(host.immature, [&](const ImmaturePoint& point) {
-      if (point.status == TraceStatus::kOutlier && point.found == 0) return true;
+      if (GivenUp(point)) return true;
       const bool known = std::isfinite(point.inverse_depth_max);
       return known && !Project(camera_, T, point.pixel, point.InverseDepth()).in_view;
     });
@@ -733,6 +733,7 @@ DirectFrameResult DirectOdometry::Process(std::int64_t time_ns, const cv::Mat& g
 }
 
 std::vector<DirectPose> DirectOdometry::Trajectory() const { return impl_->Trajectory(); }
+const Camera& DirectOdometry::camera() const { return impl_->camera(); }
 std::vector<MapPoint> DirectOdometry::TakeFinishedPoints() { return impl_->TakeFinishedPoints(); }
 std::vector<MapPoint> DirectOdometry::ActivePoints() const { return impl_->ActivePoints(); }
 

@@ -155,6 +155,9 @@ class DirectOdometry {
   /// known now: key-frames refined, others as they lie to their key-frame.
   std::vector<DirectPose> Trajectory() const;
 
+  /// As it is known now: the one given, unless `window.sigma_intrinsics` has it refined.
+  const Camera& camera() const;
+
   /// Points that have left the window since the last call.
   std::vector<MapPoint> TakeFinishedPoints();
 

@@ -13,6 +13,8 @@
 /// What direct odometry keeps of a key-frame.
 namespace sgf::direct {
 
+inline constexpr int kPatchPixels = 8;  ///< of alignment::Pattern::kDso8
+
 /// Brightness of an image of radiance L: I = exp(a) L + b, in grey levels. With known exposure
 /// times a begins at their logarithm.
 struct Brightness {
@@ -50,12 +52,14 @@ enum class TraceStatus {
 /// along the optical axis.
 struct ImmaturePoint {
   Eigen::Vector2f pixel;
+  Eigen::Matrix2f structure = Eigen::Matrix2f::Zero();  ///< structure tensor of its patch
   float inverse_depth_min = 0;
   float inverse_depth_max = INFINITY;
   float quality = 0;             ///< second best over best dissimilarity on the last line
   float interval_px = INFINITY;  ///< length of the interval on the last line
   TraceStatus status = TraceStatus::kNew;
-  int found = 0;  ///< how often its interval became smaller
+  int found = 0;     ///< how often its interval became smaller
+  int outliers = 0;  ///< in a row
 
   float InverseDepth() const { return 0.5f * (inverse_depth_min + inverse_depth_max); }
 };

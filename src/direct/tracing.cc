@@ -46,7 +46,7 @@ class DepthEstimatorOf : public DepthEstimator {
       point.status = TraceStatus::kSkipped;
       return;
     }
-    const float error_px = ErrorAcross(host.image(), point.pixel, line);
+    const float error_px = ErrorAlong(point.structure, line);
     if (bounded) {
       constexpr float kWorthwhile = 3;  // times its error a line has to be long
       if (kWorthwhile * error_px > line.length) {
@@ -65,6 +65,7 @@ class DepthEstimatorOf : public DepthEstimator {
     Search(image, patch, warp, line, point);
     if (point.status != TraceStatus::kGood) return;
     Narrow(host.image(), image, patch, line, error_px, warp, point);
+    point.outliers = point.status == TraceStatus::kOutlier ? point.outliers + 1 : 0;
   }
 
   RefinedDepth Refine(const Keyframe& host, const Vector2f& pixel, double inverse_depth,
@@ -115,6 +116,7 @@ class DepthEstimatorOf : public DepthEstimator {
 
  private:
   static constexpr float kMostErrorPx = 3;
+  static constexpr float kInfinite = 1e30f;
 
   /// Where a point may be in the other image.
   struct Line {
@@ -173,16 +175,10 @@ class DepthEstimatorOf : public DepthEstimator {
   /// Standard deviation (px) along the line of what is found, from how its direction lies to the
   /// gradients of the patch: noise moves an edge across itself (Engel, Sturm, Cremers,
   /// "Semi-dense visual odometry for a monocular camera", 2013).
-  float ErrorAcross(const SampleChannels& image, const Vector2f& pixel, const Line& line) const {
+  static float ErrorAlong(const Matrix2f& structure, const Line& line) {
     const Vector2f along = (line.A.inverse() * line.direction).normalized();
-    const Vector2f across(-along.y(), along.x());
-    float with = 0, against = 0;
-    for (const Vector2f& offset : alignment::Offsets(alignment::Pattern::kDso8)) {
-      const Vector2f gradient = GradientOf(image.Value<float>(pixel + offset));
-      with += gradient.dot(along) * gradient.dot(along);
-      against += gradient.dot(across) * gradient.dot(across);
-    }
-    return with > 0 ? 0.2f + 0.2f * (with + against) / with : INFINITY;
+    const float with = along.dot(structure * along);
+    return with > 0 ? 0.2f + 0.2f * structure.trace() / with : INFINITY;
   }
 
   /// Inverse depth of the place on the line at a distance from its beginning.
@@ -195,16 +191,15 @@ class DepthEstimatorOf : public DepthEstimator {
     return (line.X(i) - ray(i) * line.X.z()) / (ray(i) * line.p.z() - line.p(i));
   }
 
+  /// Dissimilarity of a patch whose pixels lie at these offsets from a place; infinite out of view.
   float Cost(const SampleChannels& image, const Patch& patch, const Vector2f& place,
-             const Matrix2f& A) const {
-    constexpr float kInfinite = 1e30f;
-    const auto offsets = alignment::Offsets(alignment::Pattern::kDso8);
+             const std::array<Vector2f, kPatchPixels>& shape, const Matrix2f& A) const {
     float cost = 0;
-    for (size_t k = 0; k < patch.size; ++k) {
-      const Vector2f pixel = place + A * offsets[k];
+    for (int k = 0; k < kPatchPixels; ++k) {
+      const Vector2f pixel = place + shape[k];
       if (!image.Inside(pixel)) return kInfinite;
-      cost += residual_.template Value<float>(image.Value(pixel), A, patch.references[k])
-                  .squaredNorm();
+      cost +=
+          residual_.template Value<float>(image.Value(pixel), A, patch.references[k]).squaredNorm();
     }
     return cost;
   }
@@ -216,16 +211,19 @@ class DepthEstimatorOf : public DepthEstimator {
     std::array<float, kMostSteps> costs;
     const int steps = std::clamp(static_cast<int>(std::ceil(line.length)) + 1, 2, kMostSteps);
     const float stride = line.length / static_cast<float>(steps - 1);
+    std::array<Vector2f, kPatchPixels> shape;
+    const auto offsets = alignment::Offsets(alignment::Pattern::kDso8);
+    for (int k = 0; k < kPatchPixels; ++k) shape[k] = line.A * offsets[k];
+    const Vector2f step = stride * line.direction;
     for (int k = 0; k < steps; ++k)
-      costs[k] =
-          Cost(image, patch, line.from + static_cast<float>(k) * stride * line.direction, line.A);
+      costs[k] = Cost(image, patch, line.from + static_cast<float>(k) * step, shape, line.A);
     const int best =
         static_cast<int>(std::min_element(costs.begin(), costs.begin() + steps) - costs.begin());
-    if (!(costs[best] < 1e29f)) {
+    if (!(costs[best] < kInfinite)) {
       point.status = TraceStatus::kOutOfView;
       return;
     }
-    float second = 1e30f;
+    float second = kInfinite;
     for (int k = 0; k < steps; ++k)
       if (std::abs(k - best) > kOwnRadius) second = std::min(second, costs[k]);
     // A short line has no second best and says nothing new about ambiguity.
@@ -305,6 +303,15 @@ void CheckOptions(const TracingOptions& options) {
           options.min_correlation, "in (-1, 1)");
   require(options.min_quality >= 1, "depth.min_quality", options.min_quality, "at least 1");
   require(options.max_iterations >= 1, "depth.max_iterations", options.max_iterations, "positive");
+}
+
+ImmaturePoint MakeImmaturePoint(const SampleChannels& image, const Vector2f& pixel) {
+  ImmaturePoint point{.pixel = pixel};
+  for (const Vector2f& offset : alignment::Offsets(alignment::Pattern::kDso8)) {
+    const Vector2f gradient = GradientOf(image.Value<float>(pixel + offset));
+    point.structure += gradient * gradient.transpose();
+  }
+  return point;
 }
 
 std::unique_ptr<const DepthEstimator> MakeDepthEstimator(const Camera& camera,

@@ -36,6 +36,11 @@ struct TracingOptions {
 /// @throws Error for an option out of range, or a residual that cannot estimate depth.
 void CheckOptions(const TracingOptions& options);
 
+/// A pixel of a key-frame as a point to be searched for.
+/// @param pixel at least 3 px inside the image.
+ImmaturePoint MakeImmaturePoint(const alignment::SampleChannels& image,
+                                const Eigen::Vector2f& pixel);
+
 /// A view that a point's depth is refined with.
 struct View {
   const Keyframe* target = nullptr;

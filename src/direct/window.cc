@@ -9,35 +9,27 @@
 #include <fmt/core.h>
 
 #include <sgf/alignment/patch_alignment.h>
-#include <sgf/alignment/residual_table.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
 #include <sgf/direct/window.h>
+#include <sgf/direct/window_patches.h>
 
 namespace sgf::direct {
 namespace {
 
-using alignment::Pattern;
 using Eigen::MatrixXd, Eigen::VectorXd;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Warp = alignment::Se3DepthWarp<float>;
 
-constexpr int kPatchPixels = 8;
 constexpr double kHeld = 1e9;  // information of a parameter that is held
 
-using FrameBlock = Eigen::Matrix<double, kFrameParameters, kFrameParameters>;
+/// The camera takes a key-frame's place among the parameters, after all of them: fx, fy, cx, cy as
+/// differences from where it was linearised, and four without a meaning.
+constexpr int kCameraId = -1, kIntrinsics = 4;
 
 /// Normal equations in the parameters of all key-frames, inverse depths eliminated.
 struct Reduced {
   MatrixXd H;
   VectorXd b;
-};
-
-/// Normal equations in the relative parameters of a pair of key-frames.
-struct PairSum {
-  int host = -1, target = -1;
-  FrameBlock H = FrameBlock::Zero();
-  FrameParameters b = FrameParameters::Zero();
 };
 
 /// delta_rel = delta_cur - Ad(T_cur_ref) delta_ref for left perturbations of both poses.
@@ -68,14 +60,35 @@ void SetParameters(const FrameParameters& x, Keyframe& frame) {
                       frame.brightness_linearization.b + x(7)};
 }
 
-/// Derivatives are taken where a key-frame is now, unless the prior says where.
-void LinearizeHere(Window& window) {
-  for (const auto& frame : window) {
-    if (frame->in_prior) continue;
-    frame->linearization = frame->T_cam_world;
-    frame->brightness_linearization = frame->brightness;
-  }
+/// @return fx, fy, cx, cy, px.
+std::array<double*, kIntrinsics> IntrinsicsOf(Camera& camera) {
+  return {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
 }
+
+/// What is known of the camera beforehand.
+class CameraCost : public ceres::SizedCostFunction<kFrameParameters, kFrameParameters> {
+ public:
+  CameraCost(Camera linearization, Camera expected, double sigma_px) : sigma_px_(sigma_px) {
+    offset_.setZero();
+    for (int k = 0; k < kIntrinsics; ++k)
+      offset_(k) = *IntrinsicsOf(linearization)[k] - *IntrinsicsOf(expected)[k];
+  }
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    Eigen::Map<FrameParameters> r(residuals);
+    r = (offset_ + Eigen::Map<const FrameParameters>(parameters[0])) / sigma_px_;
+    using Block = Eigen::Matrix<double, kFrameParameters, kFrameParameters>;
+    if (jacobians && jacobians[0]) {
+      Eigen::Map<Block> J(jacobians[0]);
+      J = Block::Identity() / sigma_px_;
+    }
+    return true;
+  }
+
+ private:
+  double sigma_px_;
+  FrameParameters offset_;
+};
 
 /// What is known of a brightness beforehand.
 class BrightnessCost : public ceres::SizedCostFunction<2, kFrameParameters> {
@@ -128,34 +141,22 @@ class PriorCost : public ceres::CostFunction {
 }  // namespace
 
 class WindowOptimizer::Engine {
- public:
-  virtual ~Engine() = default;
-  virtual WindowSummary Refine(Window& window, const Prior& prior, bool exposures_known) = 0;
-  virtual void Marginalize(Window& window,
-                           std::span<const std::pair<int, const ActivePoint*>> points,
-                           Prior& prior) = 0;
-};
+  using RelativeByFrame = Eigen::Matrix<double, kRelativeParameters, kFrameParameters>;
 
-template <class Residual>
-class WindowOptimizer::EngineOf : public Engine {
-  static constexpr int kDim = Residual::kDim;
-  static constexpr bool kBrightness = Residual::kExtraParameters == 2;
-  /// Parameters of a point between two key-frames: relative pose, inverse depth and, where the
-  /// residual has one, relative brightness.
-  static constexpr int kRelative = 7 + Residual::kExtraParameters;
-  static constexpr int kDepth = 6;  ///< where the inverse depth is among them
-  using Reference = typename Residual::template Reference<float>;
-  using Equations = alignment::NormalEquations<float, kRelative>;
-
-  /// How one key-frame sees the points of another.
-  struct Pair {
-    Warp now, linear;  ///< where they are and where derivatives are taken
-    Residual residual;
-    FrameBlock by_host, by_target;  ///< of relative pose and brightness by the key-frames' own
+  struct Pair : KeyframePair {
+    RelativeByFrame by_host, by_target;  ///< of relative parameters by the key-frames' own
   };
 
-  /// The pixels of a point.
-  struct PointPatch {
+  /// Normal equations in the relative parameters of a pair of key-frames.
+  struct PairSum {
+    int host = -1, target = -1;
+    Eigen::Matrix<double, kRelativeParameters, kRelativeParameters> H =
+        Eigen::Matrix<double, kRelativeParameters, kRelativeParameters>::Zero();
+    RelativeParameters b = RelativeParameters::Zero();
+  };
+
+  /// A point of the window; its patch has the same number.
+  struct Point {
     ActivePoint* point = nullptr;
     int host = 0;
     int first = 0, last = 0;  ///< its items
@@ -163,19 +164,17 @@ class WindowOptimizer::EngineOf : public Engine {
     double linear_depth = 0;  ///< where it was linearised
     double information = 0;   ///< H_dd
     double slope = 0;         ///< b_d
-    std::array<alignment::Vector2<float>, kPatchPixels> rays = {};
-    std::array<Reference, kPatchPixels> references = {};
   };
 
   enum class Sight { kGood, kOutlier, kOutOfView };
 
   /// A point as a key-frame sees it.
   struct Item {
-    int patch = 0, target = 0;
+    int point = 0, target = 0;
     Sight sight = Sight::kGood;
     double cost = 0;  ///< sum of rho / 2 over the pixels; when out of view, as it was before
-    double information = 0, slope = 0;                 ///< its share of H_dd and b_d
-    FrameParameters across = FrameParameters::Zero();  ///< H_xd, x relative pose and brightness
+    double information = 0, slope = 0;                       ///< its share of H_dd and b_d
+    RelativeParameters across = RelativeParameters::Zero();  ///< H_xd, 0 for the depth itself
   };
 
   /// The window as a cost function of its key-frames. Inverse depths follow them: they are where
@@ -185,9 +184,9 @@ class WindowOptimizer::EngineOf : public Engine {
   /// more that makes up for the rest of the cost.
   class WindowCost : public ceres::CostFunction {
    public:
-    WindowCost(EngineOf& engine, Window& window) : engine_(engine), window_(window) {
-      mutable_parameter_block_sizes()->assign(window.size(), kFrameParameters);
-      set_num_residuals(kFrameParameters * static_cast<int>(window.size()) + 1);
+    WindowCost(Engine& engine, Window& window) : engine_(engine), window_(window) {
+      mutable_parameter_block_sizes()->assign(engine.Blocks(window), kFrameParameters);
+      set_num_residuals(kFrameParameters * static_cast<int>(engine.Blocks(window)) + 1);
     }
 
     bool Evaluate(double const* const* parameters, double* residuals,
@@ -205,31 +204,40 @@ class WindowOptimizer::EngineOf : public Engine {
       const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
       r.head(root.e.size()) = root.e;
       r(r.size() - 1) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
-      for (size_t k = 0; k < window_.size(); ++k) {
+      for (size_t k = 0; k < engine_.Blocks(window_); ++k) {
         if (!jacobians[k]) continue;
         using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
         Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), kFrameParameters);
         J.setZero();
-        J.topRows(root.S.rows()) = root.S.template middleCols<kFrameParameters>(
-            kFrameParameters * static_cast<Eigen::Index>(k));
+        J.topRows(root.S.rows()) =
+            root.S.middleCols<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
       }
       return std::isfinite(cost);
     }
 
    private:
-    EngineOf& engine_;
+    Engine& engine_;
     Window& window_;
   };
 
  public:
-  EngineOf(const Camera& camera, const WindowOptions& options, int threads)
-      : camera_(camera),
+  Engine(const Camera& camera, const WindowOptions& options, int threads)
+      : given_camera_(camera),
+        camera_(camera),
+        camera_linearization_(camera),
         options_(options),
+        refines_camera_(options.sigma_intrinsics > 0),
         threads_(threads),
-        offsets_(alignment::Offsets(Pattern::kDso8)) {}
+        patches_(MakeWindowPatches(options.residual, camera, refines_camera_)) {
+    by_camera_.setZero();
+    if (refines_camera_)
+      by_camera_.block<kIntrinsics, kIntrinsics>(kRelativeCamera, 0).setIdentity();
+  }
 
-  WindowSummary Refine(Window& window, const Prior& prior, bool exposures_known) override {
-    LinearizeHere(window);
+  const Camera& camera() const { return camera_; }
+
+  WindowSummary Refine(Window& window, const Prior& prior, bool exposures_known) {
+    LinearizeHere(window, prior);
     Collect(window, [](const ActivePoint&) { return true; });
     WindowSummary summary;
     if (items_.empty()) return summary;
@@ -241,8 +249,8 @@ class WindowOptimizer::EngineOf : public Engine {
   }
 
   void Marginalize(Window& window, std::span<const std::pair<int, const ActivePoint*>> points,
-                   Prior& prior) override {
-    LinearizeHere(window);
+                   Prior& prior) {
+    LinearizeHere(window, prior);
     std::vector<const ActivePoint*> chosen;
     for (const auto& [host, point] : points) chosen.push_back(point);
     std::sort(chosen.begin(), chosen.end());
@@ -257,52 +265,68 @@ class WindowOptimizer::EngineOf : public Engine {
       ids.push_back(frame->id);
       frame->in_prior = true;
     }
+    if (refines_camera_) ids.push_back(kCameraId);
     // The prior's parameters count from the linearisation, those here from where it is now.
     prior.Add(ids, reduced.H, reduced.b - reduced.H * x_);
   }
 
  private:
+  /// Parameter blocks of a window: its key-frames and maybe the camera.
+  size_t Blocks(const Window& window) const { return window.size() + (refines_camera_ ? 1 : 0); }
+
+  /// Derivatives are taken where things are now, unless the prior says where.
+  void LinearizeHere(Window& window, const Prior& prior) {
+    for (const auto& frame : window) {
+      if (frame->in_prior) continue;
+      frame->linearization = frame->T_cam_world;
+      frame->brightness_linearization = frame->brightness;
+    }
+    const auto& known = prior.frames();
+    if (std::find(known.begin(), known.end(), kCameraId) == known.end())
+      camera_linearization_ = camera_;
+  }
+
   template <class Chosen>
   void Collect(Window& window, const Chosen& chosen) {
-    patches_.clear();
+    patches_->Clear();
+    points_.clear();
     items_.clear();
     std::map<int, int> position;
     for (size_t k = 0; k < window.size(); ++k) position[window[k]->id] = static_cast<int>(k);
     for (size_t h = 0; h < window.size(); ++h)
       for (ActivePoint& point : window[h]->points)
-        if (chosen(point)) AddPatch(*window[h], static_cast<int>(h), position, point);
+        if (chosen(point)) AddPoint(*window[h], static_cast<int>(h), position, point);
     order_.resize(items_.size());
     std::iota(order_.begin(), order_.end(), 0);
     std::stable_sort(order_.begin(), order_.end(),
                      [&](int a, int b) { return PairOf(a) < PairOf(b); });
-    x_.resize(kFrameParameters * static_cast<Eigen::Index>(window.size()));
+    x_.setZero(kFrameParameters * static_cast<Eigen::Index>(Blocks(window)));
     for (size_t k = 0; k < window.size(); ++k) FrameOf(x_, k) = ParametersOf(*window[k]);
+    if (refines_camera_)
+      for (int k = 0; k < kIntrinsics; ++k)
+        FrameOf(x_, window.size())(k) =
+            *IntrinsicsOf(camera_)[k] - *IntrinsicsOf(camera_linearization_)[k];
     linear_x_ = x_;
   }
 
-  void AddPatch(const Keyframe& host, int h, const std::map<int, int>& position,
+  void AddPoint(const Keyframe& host, int h, const std::map<int, int>& position,
                 ActivePoint& point) {
-    PointPatch patch{.point = &point,
-                     .host = h,
-                     .first = static_cast<int>(items_.size()),
-                     .depth = point.inverse_depth,
-                     .linear_depth = point.inverse_depth};
-    for (int k = 0; k < kPatchPixels; ++k) {
-      const Eigen::Vector2f pixel = point.pixel + offsets_[k];
-      patch.rays[k] = alignment::RayOf<float>(camera_, pixel);
-      patch.references[k] =
-          Residual::template MakeReference<float>(host.image().template Sample<float>(pixel));
-    }
+    patches_->Add(host.image(), point.pixel);
+    const int first = static_cast<int>(items_.size());
     for (const Observation& seen : point.observations)
       items_.push_back(
-          {.patch = static_cast<int>(patches_.size()), .target = position.at(seen.target)});
-    patch.last = static_cast<int>(items_.size());
-    patches_.push_back(patch);
+          {.point = static_cast<int>(points_.size()), .target = position.at(seen.target)});
+    points_.push_back({.point = &point,
+                       .host = h,
+                       .first = first,
+                       .last = static_cast<int>(items_.size()),
+                       .depth = point.inverse_depth,
+                       .linear_depth = point.inverse_depth});
   }
 
   /// Items of a pair are worked on together: they wait for the same image.
   std::pair<int, int> PairOf(int item) const {
-    return {items_[item].target, patches_[items_[item].patch].host};
+    return {items_[item].target, points_[items_[item].point].host};
   }
 
   static auto FrameOf(VectorXd& x, size_t k) {
@@ -311,26 +335,33 @@ class WindowOptimizer::EngineOf : public Engine {
 
   /// Takes on the key-frames' parameters, and the inverse depths that go with them.
   void MoveTo(Window& window, double const* const* parameters) {
-    for (size_t k = 0; k < window.size(); ++k)
+    for (size_t k = 0; k < Blocks(window); ++k)
       FrameOf(x_, k) = Eigen::Map<const FrameParameters>(parameters[k]);
     MoveTo(window);
   }
 
   void MoveTo(Window& window) {
     for (size_t k = 0; k < window.size(); ++k) SetParameters(FrameOf(x_, k), *window[k]);
+    if (refines_camera_)
+      for (int k = 0; k < kIntrinsics; ++k)
+        *IntrinsicsOf(camera_)[k] =
+            *IntrinsicsOf(camera_linearization_)[k] + FrameOf(x_, window.size())(k);
     if (pairs_.empty()) return;
     const VectorXd step = x_ - linear_x_;
-    for (PointPatch& patch : patches_) {
-      if (!(patch.information > 0)) continue;
-      double slope = patch.slope;
-      for (int i = patch.first; i < patch.last; ++i) {
+    for (Point& point : points_) {
+      if (!(point.information > 0)) continue;
+      double slope = point.slope;
+      for (int i = point.first; i < point.last; ++i) {
         const Pair& pair = PairAt(window, i);
-        slope += items_[i].across.dot(pair.by_host * Segment(step, patch.host) +
-                                      pair.by_target * Segment(step, items_[i].target));
+        RelativeParameters relative = pair.by_host * Segment(step, point.host) +
+                                      pair.by_target * Segment(step, items_[i].target);
+        if (refines_camera_)
+          relative += by_camera_ * Segment(step, static_cast<int>(window.size()));
+        slope += items_[i].across.dot(relative);
       }
       constexpr double kLeastShare = 0.2;  // an inverse depth stays positive
-      patch.depth = std::max(patch.linear_depth - slope / patch.information,
-                             kLeastShare * patch.linear_depth);
+      point.depth = std::max(point.linear_depth - slope / point.information,
+                             kLeastShare * point.linear_depth);
     }
   }
 
@@ -339,26 +370,24 @@ class WindowOptimizer::EngineOf : public Engine {
   }
 
   const Pair& PairAt(const Window& window, int item) const {
-    return pairs_[patches_[items_[item].patch].host * window.size() + items_[item].target];
+    return pairs_[points_[items_[item].point].host * window.size() + items_[item].target];
   }
 
   Pair MakePair(const Keyframe& host, const Keyframe& target) const {
     const SE3 T_now = target.T_cam_world * host.T_cam_world.Inverse();
     const SE3 T_linear = target.linearization * host.linearization.Inverse();
-    Pair pair{
-        {camera_, T_now, 0}, {camera_, T_linear, 0}, {}, FrameBlock::Zero(), FrameBlock::Zero()};
-    pair.by_target.template topLeftCorner<6, 6>().setIdentity();
-    pair.by_host.template topLeftCorner<6, 6>() = -Adjoint(T_linear);
-    if constexpr (kBrightness) {
-      const RelativeBrightness relative = Between(host.brightness, target.brightness);
-      pair.residual.alpha = relative.alpha;
-      pair.residual.beta = relative.beta;
-      // alpha = a_h - a_t, beta = b_h - exp(alpha) b_t
-      const Brightness &a = host.brightness_linearization, &b = target.brightness_linearization;
-      const double gain = std::exp(Between(a, b).alpha);
-      pair.by_host.template bottomRightCorner<2, 2>() << 1, 0, -gain * b.b, 1;
-      pair.by_target.template bottomRightCorner<2, 2>() << -1, 0, gain * b.b, -gain;
-    }
+    Pair pair{{{camera_, T_now, 0, given_camera_},
+               {camera_linearization_, T_linear, 0, given_camera_},
+               Between(host.brightness, target.brightness)},
+              RelativeByFrame::Zero(),
+              RelativeByFrame::Zero()};
+    pair.by_target.topLeftCorner<6, 6>().setIdentity();
+    pair.by_host.topLeftCorner<6, 6>() = -Adjoint(T_linear);
+    // alpha = a_h - a_t, beta = b_h - exp(alpha) b_t
+    const Brightness &a = host.brightness_linearization, &b = target.brightness_linearization;
+    const double gain = std::exp(Between(a, b).alpha);
+    pair.by_host.block<2, 2>(kRelativeBrightness, 6) << 1, 0, -gain * b.b, 1;
+    pair.by_target.block<2, 2>(kRelativeBrightness, 6) << -1, 0, gain * b.b, -gain;
     return pair;
   }
 
@@ -377,100 +406,67 @@ class WindowOptimizer::EngineOf : public Engine {
     ParallelFor(batches, threads_, [&](int batch) {
       for (int k = batch * kBatch; k < std::min(count, (batch + 1) * kBatch); ++k) {
         Item& item = items_[order_[k]];
-        const Pair& pair = PairAt(window, order_[k]);
-        Equations equations;
-        EvaluateItem(window[item.target]->image(), pair, linearize, item, equations);
-        if (linearize) Linearize(equations, item, SumOf(sums_[batch], order_[k]));
+        if (linearize)
+          Linearize(window, item, PairAt(window, order_[k]), SumOf(sums_[batch], order_[k]));
+        else
+          Judge(patches_->Cost(item.point, points_[item.point].depth, PairAt(window, order_[k]),
+                               window[item.target]->image(), scale_),
+                item);
       }
     });
     double cost = 0;
     for (const Item& item : items_) cost += item.cost;
     if (!linearize) return cost;
     linear_x_ = x_;
-    for (PointPatch& patch : patches_) {
-      patch.linear_depth = patch.depth;
-      patch.information = patch.slope = 0;
-      for (int i = patch.first; i < patch.last; ++i) {
-        patch.information += items_[i].information;
-        patch.slope += items_[i].slope;
+    for (Point& point : points_) {
+      point.linear_depth = point.depth;
+      point.information = point.slope = 0;
+      for (int i = point.first; i < point.last; ++i) {
+        point.information += items_[i].information;
+        point.slope += items_[i].slope;
       }
     }
     return cost;
   }
 
-  void EvaluateItem(const alignment::SampleChannels& image, const Pair& pair, bool linearize,
-                    Item& item, Equations& equations) const {
-    const PointPatch& patch = patches_[item.patch];
-    const auto depth = static_cast<float>(patch.depth);
-    const auto input = [&](int k) {
-      return Warp::Input{patch.rays[k], depth, alignment::Vector2<float>::Zero()};
-    };
-    std::array<Warp::Point, kPatchPixels> now;
-    for (int k = 0; k < kPatchPixels; ++k) {
-      if (!pair.now.At(input(k), now[k]) || !image.Inside(now[k].pixel)) {
-        item.sight = Sight::kOutOfView;
-        return;
-      }
-      image.Prefetch(now[k].pixel);
-    }
-    const alignment::RobustLoss<float> loss{alignment::RobustKind::kHuber, 1};
-    const auto inverse_scale = static_cast<float>(1 / scale_);
-    float cost = 0;
-    for (int k = 0; k < kPatchPixels; ++k) {
-      if (!linearize) {
-        cost += loss.Rho(
-            (inverse_scale * pair.residual.template Value<float>(image.Value(now[k].pixel),
-                                                                 now[k].A(), patch.references[k]))
-                .squaredNorm());
-        continue;
-      }
-      const auto at = image.Sample(now[k].pixel);
-      const Eigen::Matrix<float, kDim, 1> r =
-          inverse_scale *
-          pair.residual.template Value<float>(at.value, now[k].A(), patch.references[k]);
-      const float s = r.squaredNorm();
-      cost += loss.Rho(s);
-      Warp::Point linear;
-      if (!pair.linear.At(input(k), linear)) {
-        item.sight = Sight::kOutOfView;
-        return;
-      }
-      Eigen::Matrix<float, kDim, kRelative> J;
-      pair.residual.Linearize(at, linear, patch.references[k], J);
-      equations.Add(r, inverse_scale * J, loss.Weight(s));
-    }
-    // Beyond the limit an observation costs the same however bad it is.
+  /// Beyond a limit an observation costs the same however bad it is.
+  void Judge(const std::optional<double>& cost, Item& item) const {
     const double most = options_.max_cost * kPatchPixels;
-    item.sight = cost > most ? Sight::kOutlier : Sight::kGood;
-    item.cost = 0.5 * std::min<double>(cost, most);
+    if (!cost) {
+      item.sight = Sight::kOutOfView;
+      return;
+    }
+    item.sight = *cost > most ? Sight::kOutlier : Sight::kGood;
+    item.cost = 0.5 * std::min(*cost, most);
   }
 
   /// The sum of an item's pair in a batch, whose items are sorted by pairs.
   PairSum& SumOf(std::vector<PairSum>& sums, int item) const {
-    const int host = patches_[items_[item].patch].host, target = items_[item].target;
+    const int host = points_[items_[item].point].host, target = items_[item].target;
     if (sums.empty() || sums.back().host != host || sums.back().target != target)
       sums.push_back({.host = host, .target = target});
     return sums.back();
   }
 
-  static void Linearize(const Equations& equations, Item& item, PairSum& sum) {
+  void Linearize(const Window& window, Item& item, const Pair& pair, PairSum& sum) const {
+    RelativeEquations equations;
+    Judge(patches_->Linearize(item.point, points_[item.point].depth, pair,
+                              window[item.target]->image(), scale_, equations),
+          item);
     item.information = item.slope = 0;
     item.across.setZero();
     if (item.sight != Sight::kGood) return;
-    const Eigen::Matrix<double, kRelative, kRelative> H = equations.H();
-    const Eigen::Matrix<double, kRelative, 1> b = equations.b();
-    item.information = H(kDepth, kDepth);
-    item.slope = b(kDepth);
-    item.across.template head<6>() = H.template block<6, 1>(0, kDepth);
-    sum.H.template topLeftCorner<6, 6>() += H.template topLeftCorner<6, 6>();
-    sum.b.template head<6>() += b.template head<6>();
-    if constexpr (kBrightness) {
-      item.across.template tail<2>() = H.template block<2, 1>(7, kDepth);
-      sum.H.template topRightCorner<6, 2>() += H.template block<6, 2>(0, 7);
-      sum.H.template bottomLeftCorner<2, 6>() += H.template block<2, 6>(7, 0);
-      sum.H.template bottomRightCorner<2, 2>() += H.template block<2, 2>(7, 7);
-      sum.b.template tail<2>() += b.template tail<2>();
+    if (refines_camera_) {
+      sum.H += equations.H;
+    } else {
+      constexpr int n = kRelativeCamera;  // all that plays a part
+      sum.H.topLeftCorner<n, n>() += equations.H.topLeftCorner<n, n>();
     }
+    sum.b += equations.b;
+    item.information = equations.H(kRelativeDepth, kRelativeDepth);
+    item.slope = equations.b(kRelativeDepth);
+    item.across = equations.H.col(kRelativeDepth);
+    item.across(kRelativeDepth) = 0;
   }
 
   /// The last linearisation without inverse depths.
@@ -478,60 +474,64 @@ class WindowOptimizer::EngineOf : public Engine {
     Reduced total{MatrixXd::Zero(x_.size(), x_.size()), VectorXd::Zero(x_.size())};
     for (const auto& sums : sums_)
       for (const PairSum& sum : sums) AddPair(window, sum, total);
-    const int count = static_cast<int>(patches_.size());
+    const int count = static_cast<int>(points_.size());
     const int batches = (count + kBatch - 1) / kBatch;
     std::vector<Reduced> parts(batches);
     ParallelFor(batches, threads_, [&](int batch) {
       parts[batch] = {MatrixXd::Zero(x_.size(), x_.size()), VectorXd::Zero(x_.size())};
       for (int p = batch * kBatch; p < std::min(count, (batch + 1) * kBatch); ++p)
-        SubtractDepth(window, patches_[p], parts[batch]);
+        SubtractDepth(window, points_[p], parts[batch]);
     });
     for (const Reduced& part : parts) {
       total.H += part.H;
       total.b += part.b;
     }
-    total.H = total.H.template selfadjointView<Eigen::Lower>();
+    total.H = total.H.selfadjointView<Eigen::Lower>();
     return total;
   }
 
   /// Adds to the lower triangle.
   void AddPair(const Window& window, const PairSum& sum, Reduced& total) const {
     constexpr int n = kFrameParameters;
-    const int host = sum.host, target = sum.target;
-    const Pair& pair = pairs_[host * window.size() + target];
-    total.b.segment<n>(n * host) += pair.by_host.transpose() * sum.b;
-    total.b.segment<n>(n * target) += pair.by_target.transpose() * sum.b;
-    total.H.block<n, n>(n * host, n * host) += pair.by_host.transpose() * sum.H * pair.by_host;
-    total.H.block<n, n>(n * target, n * target) +=
-        pair.by_target.transpose() * sum.H * pair.by_target;
-    const FrameBlock across = pair.by_target.transpose() * sum.H * pair.by_host;
-    if (target > host)
-      total.H.block<n, n>(n * target, n * host) += across;
-    else
-      total.H.block<n, n>(n * host, n * target) += across.transpose();
+    const Pair& pair = pairs_[sum.host * window.size() + sum.target];
+    const int camera = static_cast<int>(window.size());
+    const std::array<std::pair<int, const RelativeByFrame*>, 3> blocks = {
+        {{sum.host, &pair.by_host}, {sum.target, &pair.by_target}, {camera, &by_camera_}}};
+    for (const auto& [row, by_row] : std::span(blocks).first(refines_camera_ ? 3 : 2)) {
+      total.b.segment<n>(n * row) += by_row->transpose() * sum.b;
+      const Eigen::Matrix<double, n, kRelativeParameters> to_row = by_row->transpose() * sum.H;
+      for (const auto& [col, by_col] : std::span(blocks).first(refines_camera_ ? 3 : 2))
+        if (col <= row) total.H.block<n, n>(n * row, n * col) += to_row * *by_col;
+    }
   }
 
-  void SubtractDepth(const Window& window, const PointPatch& patch, Reduced& part) const {
-    if (!(patch.information > 0)) return;
+  void SubtractDepth(const Window& window, const Point& point, Reduced& part) const {
+    if (!(point.information > 0)) return;
     constexpr int n = kFrameParameters;
-    std::array<int, 32> frames;
-    std::array<FrameParameters, 32> across;
+    std::array<int, 33> blocks;
+    std::array<FrameParameters, 33> across;
     int count = 1;
-    frames[0] = patch.host;
+    blocks[0] = point.host;
     across[0].setZero();
-    for (int i = patch.first; i < patch.last; ++i) {
+    RelativeParameters sum = RelativeParameters::Zero();
+    for (int i = point.first; i < point.last; ++i) {
       if (items_[i].sight != Sight::kGood) continue;
       const Pair& pair = PairAt(window, i);
       across[0] += pair.by_host.transpose() * items_[i].across;
-      frames[count] = items_[i].target;
+      blocks[count] = items_[i].target;
       across[count++] = pair.by_target.transpose() * items_[i].across;
+      sum += items_[i].across;
     }
-    const double inverse = 1 / patch.information;
+    if (refines_camera_) {
+      blocks[count] = static_cast<int>(window.size());
+      across[count++] = by_camera_.transpose() * sum;
+    }
+    const double inverse = 1 / point.information;
     for (int i = 0; i < count; ++i) {
-      part.b.segment<n>(n * frames[i]) -= inverse * patch.slope * across[i];
+      part.b.segment<n>(n * blocks[i]) -= inverse * point.slope * across[i];
       for (int j = 0; j < count; ++j)
-        if (frames[j] <= frames[i])
-          part.H.block<n, n>(n * frames[i], n * frames[j]).noalias() -=
+        if (blocks[j] <= blocks[i])
+          part.H.block<n, n>(n * blocks[i], n * blocks[j]).noalias() -=
               (inverse * across[i]) * across[j].transpose();
     }
   }
@@ -540,28 +540,17 @@ class WindowOptimizer::EngineOf : public Engine {
   void SetScale(const Window& window) {
     MakePairs(window);
     std::vector<std::array<float, kPatchPixels>> norms(items_.size());
+    std::vector<int> counts(items_.size());
     ParallelForBatches(static_cast<int>(items_.size()), threads_, [&](int k) {
-      const int i = order_[k];
-      const PointPatch& patch = patches_[items_[i].patch];
-      const Pair& pair = PairAt(window, i);
-      const auto& image = window[items_[i].target]->image();
-      norms[i].fill(-1);
-      for (int p = 0; p < kPatchPixels; ++p) {
-        Warp::Point point;
-        const Warp::Input input{patch.rays[p], static_cast<float>(patch.depth),
-                                alignment::Vector2<float>::Zero()};
-        if (!pair.now.At(input, point) || !image.Inside(point.pixel)) continue;
-        norms[i][p] =
-            pair.residual
-                .template Value<float>(image.Value(point.pixel), point.A(), patch.references[p])
-                .squaredNorm();
-      }
+      const Item& item = items_[order_[k]];
+      counts[k] =
+          patches_->SquaredNorms(item.point, points_[item.point].depth, PairAt(window, order_[k]),
+                                 window[item.target]->image(), norms[k]);
     });
     std::vector<float> all;
-    for (const auto& some : norms)
-      for (float norm : some)
-        if (norm >= 0) all.push_back(norm);
-    scale_ = alignment::MedianScale(std::span(all), kDim);
+    for (size_t k = 0; k < norms.size(); ++k)
+      all.insert(all.end(), norms[k].begin(), norms[k].begin() + counts[k]);
+    scale_ = alignment::MedianScale(std::span(all), patches_->dim());
     pairs_.clear();
   }
 
@@ -569,11 +558,11 @@ class WindowOptimizer::EngineOf : public Engine {
     ceres::Problem::Options problem_options;
     problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     ceres::Problem problem(problem_options);
-    std::vector<FrameParameters> frames(window.size());
+    std::vector<FrameParameters> parameters(Blocks(window));
     std::vector<double*> blocks;
-    for (size_t k = 0; k < window.size(); ++k) {
-      frames[k] = FrameOf(x_, k);
-      blocks.push_back(frames[k].data());
+    for (size_t k = 0; k < parameters.size(); ++k) {
+      parameters[k] = FrameOf(x_, k);
+      blocks.push_back(parameters[k].data());
     }
     WindowCost window_cost(*this, window);
     problem.AddResidualBlock(&window_cost, nullptr, blocks);
@@ -584,11 +573,15 @@ class WindowOptimizer::EngineOf : public Engine {
                               exposures_known ? options_.sigma_b_known : options_.sigma_b);
       problem.AddResidualBlock(&brightness.back(), nullptr, blocks[k]);
     }
+    CameraCost camera_cost(camera_linearization_, given_camera_, options_.sigma_intrinsics);
+    if (refines_camera_) problem.AddResidualBlock(&camera_cost, nullptr, blocks.back());
     const PriorCost prior_cost(prior);
     std::vector<double*> prior_blocks;
-    for (int id : prior.frames())
+    for (int id : prior.frames()) {
+      if (id == kCameraId) prior_blocks.push_back(blocks.back());
       for (size_t k = 0; k < window.size(); ++k)
         if (window[k]->id == id) prior_blocks.push_back(blocks[k]);
+    }
     if (prior_cost.num_residuals() > 0)
       problem.AddResidualBlock(const_cast<PriorCost*>(&prior_cost), nullptr, prior_blocks);
 
@@ -604,13 +597,13 @@ class WindowOptimizer::EngineOf : public Engine {
     WindowSummary summary;
     summary.iterations = static_cast<int>(report.iterations.size());
     summary.usable = report.IsSolutionUsable();
-    for (size_t k = 0; k < window.size(); ++k) {
-      FrameOf(x_, k) = frames[k];
-      summary.usable = summary.usable && frames[k].allFinite();
+    for (size_t k = 0; k < parameters.size(); ++k) {
+      FrameOf(x_, k) = parameters[k];
+      summary.usable = summary.usable && parameters[k].allFinite();
     }
     if (!summary.usable) {
       x_ = before;
-      for (PointPatch& patch : patches_) patch.information = 0;  // depths stay as well
+      for (Point& point : points_) point.information = 0;  // depths stay as well
     }
     MoveTo(window);
     return summary;
@@ -618,12 +611,12 @@ class WindowOptimizer::EngineOf : public Engine {
 
   void WriteBack(Window& window, WindowSummary& summary) {
     Evaluate(window, true);
-    for (PointPatch& patch : patches_) {
-      ActivePoint& point = *patch.point;
-      point.inverse_depth = patch.depth;
-      point.variance = patch.information > 0 ? 1 / patch.information : INFINITY;
+    for (const Point& from : points_) {
+      ActivePoint& point = *from.point;
+      point.inverse_depth = from.depth;
+      point.variance = from.information > 0 ? 1 / from.information : INFINITY;
       point.observations.clear();
-      for (int i = patch.first; i < patch.last; ++i) {
+      for (int i = from.first; i < from.last; ++i) {
         if (items_[i].sight != Sight::kGood) continue;
         point.observations.push_back(
             {window[items_[i].target]->id, 2 * items_[i].cost / kPatchPixels});
@@ -631,7 +624,7 @@ class WindowOptimizer::EngineOf : public Engine {
       const int seen = static_cast<int>(point.observations.size());
       point.support = std::max(point.support, seen);
       summary.observations += seen;
-      summary.outliers += patch.last - patch.first - seen;
+      summary.outliers += from.last - from.first - seen;
     }
     for (const auto& frame : window)
       std::erase_if(frame->points, [](const ActivePoint& point) {
@@ -641,11 +634,13 @@ class WindowOptimizer::EngineOf : public Engine {
 
   static constexpr int kBatch = 128;  // of items or points whose sums are taken together, in order
 
-  Camera camera_;
+  Camera given_camera_, camera_, camera_linearization_;
+  RelativeByFrame by_camera_;  ///< of relative parameters by the camera's
   WindowOptions options_;
+  bool refines_camera_;
   int threads_;
-  std::span<const Eigen::Vector2f> offsets_;
-  std::vector<PointPatch> patches_;
+  std::unique_ptr<WindowPatches> patches_;
+  std::vector<Point> points_;
   std::vector<Item> items_;  ///< those of a point together
   std::vector<int> order_;   ///< of items, pair by pair
   VectorXd x_, linear_x_;    ///< the key-frames' parameters, now and at the last linearisation
@@ -654,20 +649,16 @@ class WindowOptimizer::EngineOf : public Engine {
   double scale_ = 1;
 };
 
-namespace {
-
-template <class Residual>
-inline constexpr bool kOfWindows =
-    std::is_same_v<typename Residual::Channels, alignment::SampleChannels>&&
-        alignment::kPointwise<Residual>;
-
-}  // namespace
-
 void CheckOptions(const WindowOptions& options) {
-  alignment::VisitResidual(options.residual, [&](const auto& residual) {
-    if constexpr (!kOfWindows<std::remove_cvref_t<decltype(residual)>>)
-      throw Error("window.residual", fmt::format("'{}' cannot refine a window", options.residual));
-  });
+  if (!HasWindowPatches(options.residual, false))
+    throw Error("window.residual", fmt::format("'{}' cannot refine a window", options.residual));
+  if (options.sigma_intrinsics > 0 && !HasWindowPatches(options.residual, true))
+    throw Error("window.sigma_intrinsics",
+                fmt::format("has to be 0 with '{}': only 'photo_affine' refines the camera",
+                            options.residual));
+  if (!(options.sigma_intrinsics >= 0))
+    throw Error("window.sigma_intrinsics",
+                fmt::format("is {}; it has to be at least 0", options.sigma_intrinsics));
   const auto require = [](bool valid, const char* option, double value) {
     if (!valid) throw Error(option, fmt::format("is {}; it has to be positive", value));
   };
@@ -681,16 +672,12 @@ void CheckOptions(const WindowOptions& options) {
 
 WindowOptimizer::WindowOptimizer(const Camera& camera, const WindowOptions& options, int threads) {
   CheckOptions(options);
-  engine_ = alignment::VisitResidual(
-      options.residual, [&](const auto& residual) -> std::unique_ptr<Engine> {
-        using Residual = std::remove_cvref_t<decltype(residual)>;
-        if constexpr (kOfWindows<Residual>)
-          return std::make_unique<EngineOf<Residual>>(camera, options, threads);
-        return nullptr;
-      });
+  engine_ = std::make_unique<Engine>(camera, options, threads);
 }
 
 WindowOptimizer::~WindowOptimizer() = default;
+
+const Camera& WindowOptimizer::camera() const { return engine_->camera(); }
 
 void WindowOptimizer::Anchor(const Keyframe& first) {
   constexpr int n = kFrameParameters;

@@ -11,8 +11,8 @@
 #include <sgf/direct/prior.h>
 
 /// Joint refinement of a window of key-frames (Engel, Koltun, Cremers, "Direct sparse odometry",
-/// 2018, Section II): poses, brightness and inverse depths that make all points look alike where
-/// they are seen, with what was marginalised as a prior.
+/// 2018, Section II): poses, brightness, inverse depths and maybe the camera that make all points
+/// look alike where they are seen, with what was marginalised as a prior.
 namespace sgf::direct {
 
 struct WindowOptions {
@@ -23,6 +23,7 @@ struct WindowOptions {
   double sigma_b = 30;
   double sigma_a_known = 0.05;
   double sigma_b_known = 2;
+  double sigma_intrinsics = 0;
 
   template <class V>
   void VisitFields(V&& visit) {
@@ -34,6 +35,8 @@ struct WindowOptions {
     visit("sigma_b", sigma_b, "grey levels", "expected standard deviation of the offset");
     visit("sigma_a_known", sigma_a_known, "", "the same where exposure times are known");
     visit("sigma_b_known", sigma_b_known, "grey levels", "the same where they are known");
+    visit("sigma_intrinsics", sigma_intrinsics, "px",
+          "expected error of focal lengths and image centre; 0: the camera is not refined");
   }
 };
 
@@ -75,10 +78,11 @@ class WindowOptimizer {
 
   const Prior& prior() const { return prior_; }
 
+  /// As it is known now: the one given, unless it is refined.
+  const Camera& camera() const;
+
  private:
   class Engine;
-  template <class Residual>
-  class EngineOf;
 
   std::unique_ptr<Engine> engine_;
   Prior prior_;

@@ -65,7 +65,53 @@ FrameTime ParseFrameTime(std::string_view line, const std::string& where) {
   return {std::string(fields[0]), *time_ns, *exposure_ms};
 }
 
+/// Sets the camera's numbers from the first line of camera.txt.
+void SetIntrinsics(std::string_view line, const std::string& where, Camera& camera) {
+  auto fields = SplitFields(line, ' ');
+  std::string_view model = "FOV";
+  if (!fields.empty() && !ParseNumber<double>(fields[0])) {
+    model = fields[0];
+    fields.erase(fields.begin());
+  }
+  std::vector<double*> numbers = {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
+  if (model == "FOV" || model == "Pinhole")
+    numbers.push_back(&camera.omega);
+  else if (model == "RadTan")
+    numbers.insert(numbers.end(), {&camera.k1, &camera.k2, &camera.p1, &camera.p2});
+  else
+    throw Error(where, fmt::format("camera model {} is unknown; known: FOV, Pinhole, RadTan",
+                                   Printable(model)));
+  if (fields.size() != numbers.size())
+    throw Error(
+        where, fmt::format("{} has {} numbers, expected {}", model, fields.size(), numbers.size()));
+  for (size_t i = 0; i < fields.size(); ++i) *numbers[i] = NumberField<double>(fields[i], where);
+  if (model == "Pinhole" && camera.omega != 0)
+    throw Error(where, fmt::format("a pinhole's last number is {} instead of 0", camera.omega));
+}
+
 }  // namespace
+
+Camera ReadCameraTxt(const std::filesystem::path& path) {
+  std::istringstream lines(ReadFile(path));
+  std::string intrinsics, size;
+  std::getline(lines, intrinsics);
+  std::getline(lines, size);
+  Camera camera;
+  SetIntrinsics(intrinsics, AtLine(path, 1), camera);
+  const auto fields = SplitFields(size, ' ');
+  if (fields.size() != 2) throw Error(AtLine(path, 2), "expected width and height");
+  camera.width = NumberField<int>(fields[0], AtLine(path, 2));
+  camera.height = NumberField<int>(fields[1], AtLine(path, 2));
+  constexpr double kMostShare = 1.5;
+  if (std::max({camera.fx, camera.fy, camera.cx, camera.cy}) < kMostShare) {
+    camera.fx *= camera.width;
+    camera.fy *= camera.height;
+    camera.cx = camera.cx * camera.width - 0.5;
+    camera.cy = camera.cy * camera.height - 0.5;
+  }
+  camera.Check();
+  return camera;
+}
 
 void WritePcalib(const std::filesystem::path& path, const std::vector<double>& inverse_response) {
   RequireInverseResponse(inverse_response, path.string());

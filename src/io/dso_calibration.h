@@ -7,7 +7,9 @@
 
 #include <opencv2/core.hpp>
 
-/// Files of a photometric calibration as DSO reads them (Engel, Usenko and Cremers, "A
+#include <sgf/core/camera.h>
+
+/// Files of a calibration as DSO reads them (Engel, Usenko and Cremers, "A
 /// photometrically calibrated benchmark for monocular visual odometry", 2016;
 /// https://github.com/JakobEngel/dso). An image I = G(t V B) of irradiance B, exposure time t and
 /// vignette V is corrected by t B = G^-1(I) / V.
@@ -39,6 +41,15 @@ void WriteVignette(const std::filesystem::path& path, const cv::Mat1f& vignette)
 /// Reads vignette.png: V in (0, 1].
 /// @throws Error naming the file when it is no complete 16-bit grey PNG or is 0 somewhere.
 cv::Mat1f ReadVignette(const std::filesystem::path& path);
+
+/// Reads the camera of camera.txt: "fx fy cx cy omega", or these names and numbers: "Pinhole fx fy
+/// cx cy 0", "FOV fx fy cx cy omega", "RadTan fx fy cx cy k1 k2 p1 p2"; then a line with width and
+/// height. Focal lengths and centre are shares of these sizes where all are below 1.5, as TUM's are
+/// (the image's upper left corner is (0, 0) then). Further lines, on the images DSO makes, do not
+/// count.
+/// @throws Error naming file and line for a missing file, another model, what is no number, and as
+///   Camera::Check().
+Camera ReadCameraTxt(const std::filesystem::path& path);
 
 /// A line of times.txt.
 struct FrameTime {

@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <sgf/core/error.h>
+#include <sgf/io/dso_calibration.h>
 #include <sgf/io/exr.h>
 #include <sgf/io/image.h>
 #include <sgf/io/odometry_dataset.h>
@@ -42,9 +43,10 @@ std::string SequenceName(const fs::path& folder) {
   return (path.filename() == "mav0" ? path.parent_path() : path).filename().string();
 }
 
-// Appends a frame, or counts it as skipped when one of its files is missing.
+// Appends a frame, or counts it as skipped when one of the files it names is missing.
 void AppendFrame(OdometrySequence& sequence, OdometryFrame frame) {
-  if (IsFile(frame.left) && IsFile(frame.right.empty() ? frame.depth : frame.right))
+  const auto there = [](const fs::path& path) { return path.empty() || IsFile(path); };
+  if (IsFile(frame.left) && there(frame.right) && there(frame.depth))
     sequence.frames.push_back(std::move(frame));
   else
     ++sequence.skipped_frames;
@@ -193,7 +195,10 @@ void PairByTime(const fs::path& folder, OdometrySequence& sequence) {
         depth.begin(), depth.end(),
         [&](const TimedFile& a, const TimedFile& b) { return distance(a) < distance(b); });
     const bool near = nearest != depth.end() && distance(*nearest) <= kMaxDifference_ns;
-    AppendFrame(sequence, {rgb.time_ns, rgb.file, {}, near ? nearest->file : fs::path()});
+    if (near)
+      AppendFrame(sequence, {rgb.time_ns, rgb.file, {}, nearest->file});
+    else
+      ++sequence.skipped_frames;
   }
 }
 
@@ -277,6 +282,51 @@ void OpenRgbd(const fs::path& folder, const RgbdOptions& options, OdometrySequen
   if (!sequence.frames.empty()) SetRgbdCamera(options, sequence);
 }
 
+// ---- TUM monocular
+
+// The images in the order of their names.
+std::vector<fs::path> ImagesIn(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && cv::haveImageReader(entry.path().string()))
+      files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+void ReadTumMonoTruth(const fs::path& path, OdometrySequence& sequence) {
+  if (!IsFile(path)) return;
+  std::vector<TimedPose> poses;
+  ForEachRow(path, ' ', 8, [&](const Fields& fields, const std::string& where) {
+    if (fields[1] == "NaN" || fields[1] == "nan") return;
+    const Eigen::Vector3d xyz = VectorField(fields, 4, where);
+    const Eigen::Quaterniond q(NumberField<double>(fields[7], where), xyz.x(), xyz.y(), xyz.z());
+    AppendLater(
+        poses,
+        {SecondsField(fields[0], where), {UnitQuaternion(q, where), VectorField(fields, 1, where)}},
+        where);
+  });
+  sequence.truth = std::move(poses);
+}
+
+void OpenTumMono(const fs::path& folder, OdometrySequence& sequence) {
+  EurocCamera sensor;
+  sensor.camera = ReadCameraTxt(folder / "camera.txt");
+  sensor.rate_hz = 30;
+  sequence.cameras = {sensor};
+  const std::vector<fs::path> images = ImagesIn(folder / "images");
+  if (IsFile(folder / "times.txt")) {
+    std::map<std::string, fs::path> by_name;
+    for (const fs::path& image : images) by_name[image.stem().string()] = image;
+    for (const FrameTime& frame : ReadFrameTimes(folder / "times.txt"))
+      AppendFrame(sequence, {frame.time_ns, by_name[frame.id], {}, {}});
+  } else {
+    for (size_t i = 0; i < images.size(); ++i)
+      AppendFrame(sequence, {static_cast<std::int64_t>(i) * 1'000'000'000 / 30, images[i], {}, {}});
+  }
+  ReadTumMonoTruth(folder / "groundtruthSync.txt", sequence);
+}
+
 // ---- Depth images
 
 cv::Mat1f ReadDepthExr(const fs::path& path) {
@@ -318,9 +368,10 @@ OdometryLayout DetectLayout(const fs::path& folder) {
   if (IsFolder(folder / "rgb") && IsFolder(folder / "depth"))
     return HasFrameNumbers(folder / "associations.txt") ? OdometryLayout::kIclNuim
                                                         : OdometryLayout::kTumRgbd;
+  if (IsFolder(folder / "images") && IsFile(folder / "camera.txt")) return OdometryLayout::kTumMono;
   throw Error(folder.string(),
-              "is no sequence of a known layout: has neither mav0 or cam0, nor "
-              "image_0 with calib.txt, nor rgb with depth");
+              "is no sequence of a known layout: has neither mav0 or cam0, nor image_0 with "
+              "calib.txt, nor rgb with depth, nor images with camera.txt");
 }
 
 }  // namespace
@@ -330,7 +381,8 @@ std::span<const std::pair<const char*, OdometryLayout>> EnumNames(OdometryLayout
       {"euroc", OdometryLayout::kEuroc},
       {"kitti_odometry", OdometryLayout::kKittiOdometry},
       {"tum_rgbd", OdometryLayout::kTumRgbd},
-      {"icl_nuim", OdometryLayout::kIclNuim}};
+      {"icl_nuim", OdometryLayout::kIclNuim},
+      {"tum_mono", OdometryLayout::kTumMono}};
   return kNames;
 }
 
@@ -344,10 +396,12 @@ OdometrySequence OpenOdometrySequence(const fs::path& folder, std::optional<Odom
     OpenEuroc(folder, sequence);
   else if (sequence.layout == OdometryLayout::kKittiOdometry)
     OpenKitti(folder, sequence);
+  else if (sequence.layout == OdometryLayout::kTumMono)
+    OpenTumMono(folder, sequence);
   else
     OpenRgbd(folder, rgbd, sequence);
   if (sequence.frames.empty())
-    throw Error(folder.string(), fmt::format("has no frame with both its files; {} lack one",
+    throw Error(folder.string(), fmt::format("has no frame with all its files; {} lack one",
                                              sequence.skipped_frames));
   return sequence;
 }

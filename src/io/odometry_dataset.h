@@ -32,15 +32,20 @@ enum class OdometryLayout {
   /// ICL-NUIM in TUM's form: associations.txt with frame numbers for times, at 30 Hz (frame n is at
   /// n/30 s); truth in groundtruth.txt or a single file *.gt.freiburg, by frame number too.
   kIclNuim,
+  /// TUM's monocular benchmark, and any folder as DSO takes it: images/ with a file per frame,
+  /// camera.txt and, if there, times.txt (see dso_calibration.h; without it frames are 1/30 s
+  /// apart); truth of the camera in groundtruthSync.txt, where lines with NaN do not count.
+  kTumMono,
 };
 std::span<const std::pair<const char*, OdometryLayout>> EnumNames(OdometryLayout);
 
-/// A frame of a sequence: files of a stereo pair, or of a grey (or colour) image with its depth.
+/// A frame of a sequence: files of a stereo pair, of a grey (or colour) image with its depth, or of
+/// an image alone.
 struct OdometryFrame {
   std::int64_t time_ns = 0;
   std::filesystem::path left;   ///< the left or only image; ReadGrey() reads it
-  std::filesystem::path right;  ///< the right image; empty in a sequence with depth
-  std::filesystem::path depth;  ///< ReadDepth() reads it; empty in a stereo sequence
+  std::filesystem::path right;  ///< the right image; empty where there is one camera
+  std::filesystem::path depth;  ///< ReadDepth() reads it; empty where there is none
 };
 
 /// A sequence on disk. Images are left there.
@@ -51,13 +56,13 @@ struct OdometrySequence {
   /// the left (or only) camera in the others.
   std::vector<EurocCamera> cameras;
   std::vector<OdometryFrame> frames;  ///< times increase; never none
-  int skipped_frames = 0;             ///< left out since one of their two files is missing
+  int skipped_frames = 0;             ///< left out since one of their files is missing
   std::vector<ImuSample> imu;         ///< in body coordinates; empty where there is no sensor
   std::vector<TimedPose> truth;       ///< T_world_body; empty where there is none
   double depth_levels_per_m = 5000;   ///< of 16-bit depth images
 
-  /// Whether frames are stereo pairs; else they have depth.
   bool stereo() const { return cameras.size() == 2; }
+  bool has_depth() const { return !frames.front().depth.empty(); }
 };
 
 /// What the files of RGB-D sequences do not say.
@@ -85,7 +90,7 @@ struct RgbdOptions {
 /// @param layout found by looking into the folder where none is given.
 /// @throws Error naming file and line, or the folder: a layout that cannot be told, a missing or
 ///   damaged file, times that do not increase, a number of poses other than that of times (KITTI),
-///   cameras that are no stereo pair, no frame with both files.
+///   cameras that are no stereo pair, no frame with all its files.
 OdometrySequence OpenOdometrySequence(const std::filesystem::path& folder,
                                       std::optional<OdometryLayout> layout = std::nullopt,
                                       const RgbdOptions& rgbd = {});

@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <deque>
 #include <functional>
@@ -9,24 +8,11 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/stopwatch.h>
 #include <sgf/odometry/odometry.h>
 
 namespace sgf::odometry {
 namespace {
-
-class Stopwatch {
- public:
-  /// Seconds since the start or the last call.
-  double Lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const std::chrono::duration<double> elapsed = now - start_;
-    start_ = now;
-    return elapsed.count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 double Seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
 

@@ -58,6 +58,31 @@ def test_tracks_one_camera(sequence, tmp_path):
     assert "residual: sgf" in (out / "options.yaml").read_text()
 
 
+def test_takes_a_folder_as_dso_does(sequence, tmp_path):
+    folder = tmp_path / "mono"
+    folder.mkdir()
+    (folder / "images").symlink_to(sequence / "image_0")
+    (folder / "camera.txt").write_text(f"Pinhole 200 200 {WIDTH / 2} {HEIGHT / 2} 0\n{WIDTH} {HEIGHT}\ncrop\n")
+    times = "".join(f"{k:06d} {0.1 * k:.6f} 2.5\n" for k in range(FRAMES))
+    (folder / "times.txt").write_text(times)
+    for source, out in ((sequence, "kitti"), (folder, "mono")):
+        flags = ["--photometric", "none"] if source is folder else []
+        result = run("sgf_direct", source, "-o", tmp_path / out, *flags)
+        assert result.returncode == 0, result.stderr
+    poses = [(tmp_path / out / "trajectory.txt").read_text() for out in ("kitti", "mono")]
+    assert poses[0] == poses[1]
+    # With its exposures, which are all the same, the map is nearly that.
+    assert run("sgf_direct", folder, "-o", tmp_path / "exposed").returncode == 0
+    exposed = np.loadtxt(tmp_path / "exposed" / "trajectory.txt")
+    np.testing.assert_allclose(exposed, np.loadtxt(tmp_path / "mono" / "trajectory.txt"), atol=0.1)
+
+
+def test_needs_depth_or_a_second_camera_for_alignment(sequence, tmp_path):
+    (tmp_path / "images").symlink_to(sequence / "image_0")
+    (tmp_path / "camera.txt").write_text(f"Pinhole 200 200 160 120 0\n{WIDTH} {HEIGHT}\n")
+    fails(run("sgf_align", tmp_path, "-o", tmp_path / "out"), "has one camera and no depth")
+
+
 def test_online_poses_are_those_of_tracked_frames(sequence, tmp_path):
     assert run("sgf_direct", sequence, "-o", tmp_path, "--preset", "fast").returncode == 0
     states = [line.split(",")[1] for line in (tmp_path / "frames.csv").read_text().splitlines()[1:]]

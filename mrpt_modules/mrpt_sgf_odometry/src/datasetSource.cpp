@@ -78,6 +78,8 @@ class CDatasetSource : public CObservationSource
 	CDatasetSource(const std::string& folder, const TDatasetOptions& options)
 		: m_sequence(openSequence(folder, options.layout))
 	{
+		if (!m_sequence.stereo() && !m_sequence.has_depth())
+			throw Error(folder, "has one camera and no depth");
 		auto& frames = m_sequence.frames;
 		if (options.max_frames > 0 && options.max_frames < frames.size())
 			frames.resize(options.max_frames);

@@ -93,6 +93,41 @@ struct WarpCase<EpipolarWarp<double>> {
   }
 };
 
+/// A warp with all parameters of a point between two key-frames, whose camera has changed since the
+/// rays were made.
+struct WindowWarp : Se3DepthCameraWarp<double> {
+  Camera of_rays, camera;
+
+  WindowWarp(const Camera& camera_in, const SE3& T_cur_ref, double inverse_depth,
+             const Camera& of_rays_in)
+      : Se3DepthCameraWarp(camera_in, T_cur_ref, inverse_depth, of_rays_in),
+        of_rays(of_rays_in),
+        camera(camera_in) {}
+
+  void Update(const Eigen::Matrix<double, 11, 1>& delta) {
+    Se3DepthWarp<double> next = moved;
+    next.Update(delta.head<7>());
+    Camera changed = camera;
+    changed.fx += delta(7);
+    changed.fy += delta(8);
+    changed.cx += delta(9);
+    changed.cy += delta(10);
+    *this = {changed, next.motion.T_cur_ref, next.inverse_depth, of_rays};
+  }
+};
+
+template <>
+struct WarpCase<WindowWarp> : WarpCase<EpipolarWarp<double>> {
+  static WindowWarp Make(const Camera& camera, uint64_t seed) {
+    Camera changed = camera;
+    changed.fx *= 1.03;
+    changed.fy *= 0.98;
+    changed.cx += 2;
+    changed.cy -= 3;
+    return {changed, RandomMotion(seed), 0.1 + 0.8 * Uniform01(seed, 9), camera};
+  }
+};
+
 /// A patch of a few pixels that do not look like where the warp finds them: nothing vanishes.
 /// @return whether it lies inside the image, there and here.
 template <class Residual, class Warp, class Image>
@@ -257,7 +292,7 @@ void ExpectAgreementOnPicture(const cv::Mat& picture) {
 template <class T>
 class WarpTest : public testing::Test {};
 using Warps = testing::Types<TranslationWarp<double>, Se2Warp<double>, SimilarityWarp<double>,
-                             Se3Warp<double>, EpipolarWarp<double>>;
+                             Se3Warp<double>, EpipolarWarp<double>, WindowWarp>;
 TYPED_TEST_SUITE(WarpTest, Warps);
 
 }  // namespace sgf::alignment

@@ -96,6 +96,28 @@ Vector2<T> Place(const EpipolarWarp<double>& warp, const PixelAtDepth<double>& u
       MovedPoint(motion, u, Constant<T>(warp.inverse_depth + u.inverse_depth) + change[0], du));
 }
 
+// The pixel of the reference stays, its ray follows the camera.
+template <class T>
+Vector2<T> Place(const WindowWarp& warp, const PixelAtDepth<double>& u,
+                 const std::vector<T>& change, const Vector2<T>& du) {
+  const Camera &c = warp.camera, &o = warp.of_rays;
+  const T fx = Constant<T>(c.fx) + change[7], fy = Constant<T>(c.fy) + change[8];
+  const T cx = Constant<T>(c.cx) + change[9], cy = Constant<T>(c.cy) + change[10];
+  const T x = (Constant<T>(u.ray.x() * o.fx + o.cx) + du.x() - cx) / fx;
+  const T y = (Constant<T>(u.ray.y() * o.fy + o.cy) + du.y() - cy) / fy;
+  const T inverse_depth = Constant<T>(warp.moved.inverse_depth + u.inverse_depth) + change[6] +
+                          Constant<T>(u.slope.x()) * du.x() + Constant<T>(u.slope.y()) * du.y();
+  const SE3& motion = warp.moved.motion.T_cur_ref;
+  const Eigen::Matrix3d R = motion.R.toRotationMatrix();
+  Vector3<T> X;
+  for (int k = 0; k < 3; ++k)
+    X(k) = Constant<T>(R(k, 0)) * x + Constant<T>(R(k, 1)) * y + Constant<T>(R(k, 2)) +
+           inverse_depth * Constant<T>(motion.p(k));
+  const Vector3<T> v(change[0], change[1], change[2]), w(change[3], change[4], change[5]);
+  const Vector3<T> moved = X + w.cross(X) + v * inverse_depth;
+  return {fx * moved.x() / moved.z() + cx, fy * moved.y() / moved.z() + cy};
+}
+
 // A pixel of the current image as a function of the parameters.
 template <class Jet>
 struct JetPixel {

@@ -114,6 +114,22 @@ TEST(Camera, FindsNoRayWhereTheDistortionFoldsBack) {
         << "radius " << r;
 }
 
+TEST(Camera, FisheyeRadiusGrowsWithTheAngle) {
+  const Camera camera{
+      .width = 640, .height = 480, .fx = 220, .fy = 230, .cx = 315, .cy = 250, .omega = 0.93};
+  for (const double angle : {0.0, 0.3, 0.8, 1.2}) {  // rad
+    const double tangent = std::tan(angle);
+    const double radius = std::atan(2 * tangent * std::tan(camera.omega / 2)) / camera.omega;
+    const Eigen::Vector2d pixel = camera.Project({2 * tangent * 0.6, 2 * tangent * 0.8, 2});
+    EXPECT_NEAR(pixel.x(), camera.cx + camera.fx * 0.6 * radius, 1e-9);
+    EXPECT_NEAR(pixel.y(), camera.cy + camera.fy * 0.8 * radius, 1e-9);
+  }
+  for (const auto& p : AllPixels(camera)) {
+    const Eigen::Vector2d pixel(p.x, p.y);
+    ASSERT_LT((camera.Project(camera.Unproject(pixel)) - pixel).norm(), 1e-8) << pixel.transpose();
+  }
+}
+
 TEST(Camera, NamesWhatIsWrongWithItsParameters) {
   Camera camera = EurocCam0();
   EXPECT_EQ(ErrorMessage([&] { camera.Check(); }), "no error");

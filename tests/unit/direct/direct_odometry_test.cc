@@ -31,7 +31,8 @@ DirectOptions Options() {
 
 /// A camera that is carried along PoseAt().
 struct Flight {
-  explicit Flight(const DirectOptions& options = Options()) : odometry(kCamera, {}, options) {}
+  explicit Flight(const DirectOptions& options = Options(), const Camera& believed = kCamera)
+      : odometry(believed, {}, options) {}
 
   test::CornerWorld world{kCamera};
   DirectOdometry odometry;
@@ -152,6 +153,30 @@ TEST(DirectOdometry, SurvivesDroppedFramesAndAJumpCut) {
   EXPECT_EQ(flight.Fly(31).state, DirectState::kTracked);
 }
 
+TEST(DirectOdometry, BearsWrongIntrinsics) {
+  Camera wrong = kCamera;
+  wrong.fx *= 1.3;
+  wrong.fy *= 0.8;
+  Flight flight(Options(), wrong);
+  for (int k = 0; k < 50; ++k) EXPECT_TRUE(flight.Fly(k).T_world_cam.Matrix().allFinite()) << k;
+  for (const DirectPose& pose : flight.odometry.Trajectory())
+    EXPECT_TRUE(pose.T_world_cam.Matrix().allFinite());
+  for (const MapPoint& point : flight.odometry.ActivePoints())
+    EXPECT_TRUE(point.position.allFinite());
+}
+
+TEST(DirectOdometry, RefinesIntrinsics) {
+  Camera wrong = kCamera;
+  wrong.fx *= 1.03;
+  wrong.fy *= 1.03;
+  DirectOptions options = Options();
+  options.window.sigma_intrinsics = 20;
+  Flight flight(options, wrong);
+  for (int k = 0; k < 60; ++k) flight.Fly(k);
+  EXPECT_LT(std::abs(flight.odometry.camera().fx - kCamera.fx), 0.3 * (wrong.fx - kCamera.fx));
+  EXPECT_LT(std::abs(flight.odometry.camera().fy - kCamera.fy), 0.3 * (wrong.fy - kCamera.fy));
+}
+
 TEST(DirectOdometry, RefusesBadInputAndGoesOn) {
   Flight flight;
   flight.Fly(0);
@@ -180,7 +205,8 @@ TEST(DirectOdometry, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refusal([](auto& o) { o.depth.residual = "lssd"; }), HasSubstr("estimate depth"));
   Camera distorted = kCamera;
   distorted.k1 = -0.2;
-  EXPECT_THAT(ErrorMessage([&] { DirectOdometry(distorted, {}, Options()); }), HasSubstr("distortion"));
+  EXPECT_THAT(ErrorMessage([&] { DirectOdometry(distorted, {}, Options()); }),
+              HasSubstr("distortion"));
 }
 
 }  // namespace

@@ -26,7 +26,8 @@ struct Scene {
     host.pyramid.samples.push_back(alignment::MakeSampleChannels(view.grey, {}));
     PixelSelector select({.points = 300});
     for (const cv::Point& p : select(host.image()))
-      host.immature.push_back({.pixel = Eigen::Vector2f(float(p.x), float(p.y))});
+      host.immature.push_back(
+          MakeImmaturePoint(host.image(), Eigen::Vector2f(float(p.x), float(p.y))));
   }
 
   static SE3 PoseAt(int k) {

@@ -17,14 +17,21 @@ SE3 TruthAt(int k) {
   return {ExpSO3({0.01 * k, 0.02 * k, 0.01 * k}), {0.1 * k, 0.02 * k, 0.05 * k}};
 }
 
+/// Turns about all axes, which tell a camera's focal length and centre.
+SE3 WideTruthAt(int k) {
+  const double s = k % 2 ? 1 : -1;
+  return {ExpSO3({0.05 * s * (k % 3), -0.06 * s * k, 0.15 * k}),
+          {0.06 * s * k, 0.1 * (k % 3), 0.03 * k}};
+}
+
 /// Key-frames whose first has points that all the others see; poses and depths somewhat off.
-Window Disturbed(const std::vector<double>& gains, double error) {
+Window Disturbed(const std::vector<double>& gains, double error, SE3 (*truth_at)(int) = TruthAt) {
   const test::CornerWorld world(kCamera);
   Window window;
   for (size_t k = 0; k < gains.size(); ++k) {
     auto frame = std::make_unique<Keyframe>();
     frame->id = 10 + static_cast<int>(k);
-    const SE3 truth = TruthAt(static_cast<int>(k));
+    const SE3 truth = truth_at(static_cast<int>(k));
     const auto view = world.Render(truth, gains[k]);
     frame->pyramid.samples.push_back(alignment::MakeSampleChannels(view.grey, {}));
     frame->T_cam_world = truth.Inverse();
@@ -83,6 +90,33 @@ TEST(Window, EstimatesBrightness) {
   EXPECT_NEAR(100 * std::exp(relative.alpha) * 0.7 + relative.beta, 100, 2);
 }
 
+TEST(Window, RefinesTheCamera) {
+  Camera wrong = kCamera;
+  wrong.fx *= 1.03;
+  wrong.fy *= 1.03;
+  wrong.cx += 4;
+  std::vector<double> errors;
+  for (const double sigma_px : {0.0, 20.0}) {
+    Window window = Disturbed({1, 1, 1, 1, 1, 1}, 0.002, WideTruthAt);
+    WindowOptimizer optimizer(wrong, {.max_iterations = 20, .sigma_intrinsics = sigma_px}, 1);
+    optimizer.Anchor(*window[0]);
+    window[0]->in_prior = true;
+    window[0]->linearization = window[0]->T_cam_world;
+    for (int round = 0; round < 3; ++round) optimizer.Refine(window, false);
+    const Camera& found = optimizer.camera();
+    errors.push_back(std::abs(found.fx - kCamera.fx) + std::abs(found.fy - kCamera.fy) +
+                     std::abs(found.cx - kCamera.cx) + std::abs(found.cy - kCamera.cy));
+    // It stays refined when points leave.
+    std::vector<std::pair<int, const ActivePoint*>> leaving;
+    for (const ActivePoint& point : window[0]->points) leaving.emplace_back(0, &point);
+    optimizer.Marginalize(window, leaving);
+    EXPECT_EQ(optimizer.prior().frames().size(), sigma_px > 0 ? 7u : 6u);
+    EXPECT_TRUE(optimizer.prior().H().allFinite());
+  }
+  EXPECT_NEAR(errors[0], 4 + 0.06 * 260, 1e-9) << "held";
+  EXPECT_LT(errors[1], 0.5);  // px
+}
+
 TEST(Window, IsTheSameForAnyNumberOfThreads) {
   std::vector<Window> windows;
   for (const int threads : {1, 2}) {
@@ -132,6 +166,9 @@ TEST(Window, RefusesWhatItCannotRefine) {
   for (const char* residual : {"lssd", "bit_planes"})
     EXPECT_THAT(ErrorMessage([&] { WindowOptimizer(kCamera, {.residual = residual}, 1); }),
                 testing::HasSubstr("cannot refine a window"));
+  EXPECT_THAT(
+      ErrorMessage([] { WindowOptimizer(kCamera, {.residual = "ngv", .sigma_intrinsics = 1}, 1); }),
+      testing::HasSubstr("only 'photo_affine' refines the camera"));
   EXPECT_THAT(ErrorMessage([] { WindowOptimizer(kCamera, {.max_cost = 0}, 1); }),
               testing::HasSubstr("max_cost"));
 }

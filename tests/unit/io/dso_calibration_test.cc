@@ -49,6 +49,39 @@ class DsoCalibration : public ::testing::Test {
   const TempDir dir_;
 };
 
+TEST_F(DsoCalibration, CameraIsReadInAllItsForms) {
+  const auto camera = [&](const std::string& text) {
+    return ReadCameraTxt(dir_.Write("camera.txt", text));
+  };
+  const Camera fisheye = camera("0.5 0.75 0.25 0.5 0.9\n640 480\ncrop\n640 480\n");
+  EXPECT_EQ(fisheye.width, 640);
+  EXPECT_EQ(fisheye.height, 480);
+  EXPECT_EQ(fisheye.fx, 320);
+  EXPECT_EQ(fisheye.fy, 360);
+  EXPECT_EQ(fisheye.cx, 159.5);
+  EXPECT_EQ(fisheye.cy, 239.5);
+  EXPECT_EQ(fisheye.omega, 0.9);
+  EXPECT_EQ(camera("FOV 300 310 320 240 0.9\n640 480\n").cx, 320);
+  EXPECT_FALSE(camera("Pinhole 300 310 320 240 0\n640 480\n").distorted());
+  const Camera radtan = camera("RadTan 300 310 320 240 -0.2 0.1 0.01 0.02\n640 480\n");
+  EXPECT_EQ(radtan.k1, -0.2);
+  EXPECT_EQ(radtan.p2, 0.02);
+}
+
+TEST_F(DsoCalibration, CameraReportsWhatIsWrong) {
+  const auto message = [&](const std::string& text) {
+    return ErrorMessage([&] { ReadCameraTxt(dir_.Write("camera.txt", text)); });
+  };
+  EXPECT_THAT(message(""), HasSubstr("camera.txt:1: FOV has 0 numbers, expected 5"));
+  EXPECT_THAT(message("1 2 3 4\n640 480"), HasSubstr("FOV has 4 numbers, expected 5"));
+  EXPECT_THAT(message("EquiDistant 1 2 3 4 0 0 0 0\n640 480"), HasSubstr("is unknown"));
+  EXPECT_THAT(message("300 300 x 240 0\n640 480"), HasSubstr("is no number"));
+  EXPECT_THAT(message("Pinhole 300 300 320 240 1\n640 480"), HasSubstr("instead of 0"));
+  EXPECT_THAT(message("300 300 320 240 0\n640"), HasSubstr("camera.txt:2: expected width"));
+  EXPECT_THAT(message("300 300 320 240 4\n640 480"), HasSubstr("omega is 4"));
+  EXPECT_THAT(message("-300 300 320 240 0\n640 480"), HasSubstr("focal lengths"));
+}
+
 TEST_F(DsoCalibration, InverseResponseReadsBack) {
   const auto path = dir_.File("pcalib.txt");
   WritePcalib(path, Gamma());

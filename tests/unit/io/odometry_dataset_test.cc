@@ -90,8 +90,7 @@ TEST_F(EurocOdometry, SkipsAndCountsFramesWithOneEye) {
 
 TEST_F(EurocOdometry, ReportsASequenceThatIsNoStereoOne) {
   SetImages(1, {11});
-  EXPECT_EQ(OpenError(folder_),
-            folder_.string() + ": has no frame with both its files; 4 lack one");
+  EXPECT_EQ(OpenError(folder_), folder_.string() + ": has no frame with all its files; 4 lack one");
   fs::remove_all(folder_ / "mav0/cam1");
   EXPECT_EQ(OpenError(folder_), folder_.string() + ": has 1 camera(s), expected a stereo pair");
 }
@@ -292,7 +291,7 @@ TEST_F(RgbdOdometry, ReportsBadFiles) {
   Write("associations.txt", "1 depth/1.png 1\n");
   EXPECT_THAT(Error(), EndsWith("associations.txt:1: has 3 columns, expected 4"));
   Write("associations.txt", "1 depth/7.png 1 rgb/1.png\n");
-  EXPECT_THAT(Error(), EndsWith("sequence: has no frame with both its files; 1 lack one"));
+  EXPECT_THAT(Error(), EndsWith("sequence: has no frame with all its files; 1 lack one"));
 }
 
 // ---- Any
@@ -309,6 +308,47 @@ TEST(OdometryDataset, ReadsALayoutThatIsNamed) {
   EXPECT_THAT(
       ErrorMessage([&] { OpenOdometrySequence(dir.path(), OdometryLayout::kKittiOdometry); }),
       EndsWith("times.txt: file does not exist"));
+}
+
+// ---- TUM monocular
+
+class TumMono : public ::testing::Test {
+ protected:
+  TumMono() {
+    for (const char* name : {"00000", "00001", "00002"})
+      WriteImage(folder_ / "images" / (std::string(name) + ".png"));
+    dir_.Write("mono/camera.txt", "0.5 0.75 0.5 0.5 0.9\n6 4\ncrop\n6 4\n");
+  }
+
+  const TempDir dir_;
+  const fs::path folder_ = dir_.path() / "mono";
+};
+
+TEST_F(TumMono, HasImagesTimesAndTruth) {
+  dir_.Write("mono/times.txt", "00000 1.5 0.2\n00001 1.55 0.3\n00002 1.6 0.4\n");
+  dir_.Write("mono/groundtruthSync.txt", "1.5 1 2 3 0 0 0 1\n1.55 NaN NaN NaN NaN NaN NaN NaN\n");
+  const OdometrySequence sequence = OpenOdometrySequence(folder_);
+  EXPECT_EQ(sequence.layout, OdometryLayout::kTumMono);
+  EXPECT_EQ(sequence.name, "mono");
+  EXPECT_FALSE(sequence.stereo() || sequence.has_depth());
+  EXPECT_EQ(Times(sequence),
+            (std::vector<std::int64_t>{1'500'000'000, 1'550'000'000, 1'600'000'000}));
+  EXPECT_EQ(sequence.frames[2].left, folder_ / "images/00002.png");
+  EXPECT_EQ(sequence.cameras[0].camera.omega, 0.9);
+  ASSERT_EQ(sequence.truth.size(), 1U);
+  EXPECT_EQ(sequence.truth[0].pose.p, Eigen::Vector3d(1, 2, 3));
+}
+
+TEST_F(TumMono, WithoutTimesHasThirtyImagesASecond) {
+  EXPECT_EQ(Times(OpenOdometrySequence(folder_)),
+            (std::vector<std::int64_t>{0, 33'333'333, 66'666'666}));
+}
+
+TEST_F(TumMono, LeavesOutTimesWithoutAnImage) {
+  dir_.Write("mono/times.txt", "00001 1.55 0.3\n00007 1.6 0.4\n");
+  const OdometrySequence sequence = OpenOdometrySequence(folder_);
+  EXPECT_EQ(sequence.frames.size(), 1U);
+  EXPECT_EQ(sequence.skipped_frames, 1);
 }
 
 void WriteChannel(const fs::path& path, const char* name, const ExrChannel& channel) {

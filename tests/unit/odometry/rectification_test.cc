@@ -180,5 +180,36 @@ TEST(StereoRectifier, ReportsImagesOfAnotherSize) {
   EXPECT_THAT(ErrorMessage([&] { rectifier.Rectify(good, bad); }), HasSubstr("right image"));
 }
 
+TEST(Undistorter, ShowsRaysWhereTheIdealCameraHasThem) {
+  const Camera raw = EurocRig().left;
+  const Undistorter undistorter(raw);
+  const Camera& ideal = undistorter.camera();
+  EXPECT_FALSE(ideal.distorted());
+  EXPECT_EQ(ideal.fx, ideal.fy);
+  // A raw image whose grey level is the ray's x.
+  cv::Mat1f image(raw.height, raw.width);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x)
+      image(y, x) = static_cast<float>(raw.Unproject({x, y}).x());
+  const cv::Mat1f shown = undistorter.Undistort(image);
+  ASSERT_EQ(shown.size(), image.size());
+  for (int y = 0; y < shown.rows; y += 7)
+    for (int x = 0; x < shown.cols; x += 7)
+      EXPECT_NEAR(shown(y, x), ideal.Unproject({x, y}).x(), 2e-4) << x << ", " << y;
+}
+
+TEST(Undistorter, KeepsAnIdealCamera) {
+  const Camera ideal = PinholeRig().left;
+  const Undistorter undistorter(ideal);
+  const cv::Mat1b image(ideal.height, ideal.width, uint8_t{7});
+  EXPECT_EQ(undistorter.Undistort(image).data, image.data);
+  EXPECT_EQ(undistorter.camera().fx, ideal.fx);
+}
+
+TEST(Undistorter, RefusesAnImageOfAnotherSize) {
+  const Undistorter undistorter(PinholeRig().left);
+  EXPECT_THAT(ErrorMessage([&] { undistorter.Undistort(cv::Mat1b(8, 9)); }), HasSubstr("9x8"));
+}
+
 }  // namespace
 }  // namespace sgf::odometry
