@@ -172,7 +172,12 @@ TEST(DirectOdometry, RefinesIntrinsics) {
   DirectOptions options = Options();
   options.window.sigma_intrinsics = 20;
   Flight flight(options, wrong);
-  for (int k = 0; k < 60; ++k) flight.Fly(k);
+  for (int k = 0; k < 80; ++k) {  // turns tell the focal length
+    const double t = 0.05 * k;
+    SE3 pose = PoseAt(k);
+    pose.R = ExpSO3({0.25 * std::sin(2 * t), 0.3 * std::sin(1.7 * t), 0.6 * std::sin(t)});
+    flight.Show(k, flight.world.Render(pose).grey);
+  }
   EXPECT_LT(std::abs(flight.odometry.camera().fx - kCamera.fx), 0.3 * (wrong.fx - kCamera.fx));
   EXPECT_LT(std::abs(flight.odometry.camera().fy - kCamera.fy), 0.3 * (wrong.fy - kCamera.fy));
 }
