@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include <sgf/core/always_inline.h>
 #include <sgf/core/camera.h>
 #include <sgf/core/gradient.h>
 #include <sgf/metrics/epsilon.h>
@@ -62,7 +63,7 @@ class ChannelImage {
 
   /// Channels at a place that is Inside(), without their derivatives.
   template <class T>
-  Eigen::Array<T, N, 1> Value(const Eigen::Matrix<T, 2, 1>& p) const {
+  SGF_ALWAYS_INLINE Eigen::Array<T, N, 1> Value(const Eigen::Matrix<T, 2, 1>& p) const {
     using Pixel = Eigen::Map<const Eigen::Array<float, N, 1>>;
     const int x = static_cast<int>(p.x());
     const int y = static_cast<int>(p.y());
@@ -79,7 +80,7 @@ class ChannelImage {
 
   /// Channels at a place that is Inside().
   template <class T>
-  ChannelsAt<T, N> Sample(const Eigen::Matrix<T, 2, 1>& p) const {
+  SGF_ALWAYS_INLINE ChannelsAt<T, N> Sample(const Eigen::Matrix<T, 2, 1>& p) const {
     using Pixel = Eigen::Map<const Eigen::Array<float, N, 1>>;
     const int x = static_cast<int>(p.x());
     const int y = static_cast<int>(p.y());

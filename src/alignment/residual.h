@@ -33,8 +33,8 @@ Vector2<T> SlopeOf(const ChannelsAt<T, N>& at, int channel) {
 /// of the image at hand and scales with A in the mean, by ||A||^2 / 2: a similarity leaves the
 /// normalised gradient's length as it is.
 template <class T>
-metrics::Sample<T> CarrySample(const Eigen::Array<T, 4, 1>& channels,
-                               const Eigen::Matrix<T, 2, 2>& A) {
+SGF_ALWAYS_INLINE metrics::Sample<T> CarrySample(const Eigen::Array<T, 4, 1>& channels,
+                                                 const Eigen::Matrix<T, 2, 2>& A) {
   const Vector2<T> carried = A.transpose() * GradientOf(channels);
   return metrics::MakeSample<T>(channels[kIntensity], carried.x(), carried.y(),
                                 static_cast<double>(channels[kEpsilon] * A.squaredNorm() / T(2)));

@@ -185,7 +185,9 @@ struct Projector {
   /// @return false for a point that is not in front of the camera: of less than a thousandth of its
   /// depth in the reference.
   bool operator()(const PixelAtDepth<T>& u, Projection<T>& out) const {
-    out.X = R.col(0) * u.ray.x() + R.col(1) * u.ray.y() + R.col(2) + u.inverse_depth * p;
+    // Component by component: vectors of three are not always inlined.
+    for (int k = 0; k < 3; ++k)
+      out.X(k) = R(k, 0) * u.ray.x() + R(k, 1) * u.ray.y() + R(k, 2) + u.inverse_depth * p(k);
     if (!(out.X.z() > T(1e-3))) return false;
     out.inv_z = T(1) / out.X.z();
     out.x = out.X.x() * out.inv_z;
@@ -193,8 +195,10 @@ struct Projector {
     out.pixel = {fx * out.x + cx, fy * out.y + cy};
     out.fx_z = fx * out.inv_z;
     out.fy_z = fy * out.inv_z;
-    out.d_ux = R_per_px_x + p * u.slope.x();
-    out.d_uy = R_per_px_y + p * u.slope.y();
+    for (int k = 0; k < 3; ++k) {
+      out.d_ux(k) = R_per_px_x(k) + p(k) * u.slope.x();
+      out.d_uy(k) = R_per_px_y(k) + p(k) * u.slope.y();
+    }
     return true;
   }
 };

@@ -48,7 +48,7 @@ struct Arguments {
 /// Points against speed.
 void ApplyPreset(const std::string& name, direct::DirectOptions& options) {
   const std::map<std::string, std::pair<int, int>> presets = {
-      {"fast", {800, 5}}, {"default", {1500, 7}}, {"dense", {3000, 7}}};
+      {"fast", {600, 5}}, {"default", {1000, 7}}, {"dense", {2000, 7}}};
   const auto preset = presets.find(name);
   if (preset == presets.end())
     throw Error("--preset", fmt::format("'{}' is unknown; known: default, dense, fast", name));

@@ -41,7 +41,7 @@ struct DirectOptions {
   alignment::AlignmentOptions tracking = DefaultTracking();
   WindowOptions window;
   InitializerOptions initializer;
-  int active_points = 1500;
+  int active_points = 1000;
   int keyframes = 7;
   int min_keyframes = 5;
   double keyframe_flow = 0.045;

@@ -10,7 +10,7 @@ namespace sgf::direct {
 
 /// How many pixels of a key-frame become points.
 struct PixelSelectionOptions {
-  int points = 1500;
+  int points = 1000;
   int block_px = 32;
   double above_median = 7;
   int border_px = 5;

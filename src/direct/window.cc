@@ -348,16 +348,20 @@ class WindowOptimizer::Engine {
             *IntrinsicsOf(camera_linearization_)[k] + FrameOf(x_, window.size())(k);
     if (pairs_.empty()) return;
     const VectorXd step = x_ - linear_x_;
+    std::vector<RelativeParameters> relative;  // of each pair
+    for (size_t k = 0; k < pairs_.size(); ++k) {
+      const int host = static_cast<int>(k / window.size()),
+                target = static_cast<int>(k % window.size());
+      relative.push_back(pairs_[k].by_host * Segment(step, host) +
+                         pairs_[k].by_target * Segment(step, target));
+      if (refines_camera_)
+        relative.back() += by_camera_ * Segment(step, static_cast<int>(window.size()));
+    }
     for (Point& point : points_) {
       if (!(point.information > 0)) continue;
       double slope = point.slope;
       for (int i = point.first; i < point.last; ++i) {
-        const Pair& pair = PairAt(window, i);
-        RelativeParameters relative = pair.by_host * Segment(step, point.host) +
-                                      pair.by_target * Segment(step, items_[i].target);
-        if (refines_camera_)
-          relative += by_camera_ * Segment(step, static_cast<int>(window.size()));
-        slope += items_[i].across.dot(relative);
+        slope += items_[i].across.dot(relative[PairIndex(window, i)]);
       }
       constexpr double kLeastShare = 0.2;  // an inverse depth stays positive
       point.depth = std::max(point.linear_depth - slope / point.information,
@@ -369,8 +373,11 @@ class WindowOptimizer::Engine {
     return x.segment<kFrameParameters>(kFrameParameters * frame);
   }
 
+  size_t PairIndex(const Window& window, int item) const {
+    return points_[items_[item].point].host * window.size() + items_[item].target;
+  }
   const Pair& PairAt(const Window& window, int item) const {
-    return pairs_[points_[items_[item].point].host * window.size() + items_[item].target];
+    return pairs_[PairIndex(window, item)];
   }
 
   Pair MakePair(const Keyframe& host, const Keyframe& target) const {
@@ -517,9 +524,9 @@ class WindowOptimizer::Engine {
     for (int i = point.first; i < point.last; ++i) {
       if (items_[i].sight != Sight::kGood) continue;
       const Pair& pair = PairAt(window, i);
-      across[0] += pair.by_host.transpose() * items_[i].across;
+      across[0] += pair.by_host.transpose().lazyProduct(items_[i].across);
       blocks[count] = items_[i].target;
-      across[count++] = pair.by_target.transpose() * items_[i].across;
+      across[count++] = pair.by_target.transpose().lazyProduct(items_[i].across);
       sum += items_[i].across;
     }
     if (refines_camera_) {
@@ -536,16 +543,17 @@ class WindowOptimizer::Engine {
     }
   }
 
-  /// Standard deviation of the residuals in view.
+  /// Standard deviation of the residuals in view, from some of the observations.
   void SetScale(const Window& window) {
     MakePairs(window);
-    std::vector<std::array<float, kPatchPixels>> norms(items_.size());
-    std::vector<int> counts(items_.size());
-    ParallelForBatches(static_cast<int>(items_.size()), threads_, [&](int k) {
-      const Item& item = items_[order_[k]];
+    constexpr size_t kStride = 4;
+    std::vector<std::array<float, kPatchPixels>> norms((items_.size() + kStride - 1) / kStride);
+    std::vector<int> counts(norms.size());
+    ParallelForBatches(static_cast<int>(norms.size()), threads_, [&](int k) {
+      const int i = order_[kStride * k];
       counts[k] =
-          patches_->SquaredNorms(item.point, points_[item.point].depth, PairAt(window, order_[k]),
-                                 window[item.target]->image(), norms[k]);
+          patches_->SquaredNorms(items_[i].point, points_[items_[i].point].depth, PairAt(window, i),
+                                 window[items_[i].target]->image(), norms[k]);
     });
     std::vector<float> all;
     for (size_t k = 0; k < norms.size(); ++k)

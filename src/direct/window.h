@@ -17,7 +17,7 @@ namespace sgf::direct {
 
 struct WindowOptions {
   std::string residual = "photo_affine";
-  int max_iterations = 6;
+  int max_iterations = 4;
   double max_cost = 4;
   double sigma_a = 1;
   double sigma_b = 30;

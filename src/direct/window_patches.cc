@@ -22,14 +22,14 @@ class WindowPatchesOf : public WindowPatches {
   using CameraWarp = alignment::Se3DepthCameraWarp<float>;
   using Warp = std::conditional_t<kRefinesCamera, CameraWarp, alignment::Se3DepthWarp<float>>;
   using Point = typename Warp::Point;
-  using Points = std::array<Point, kPatchPixels>;
+  using PatchArray = Eigen::Array<float, kPatchPixels, 1>;
   using Reference = typename Residual::template Reference<float>;
   static constexpr int kDim = Residual::kDim;
   static constexpr bool kBrightness = Residual::kExtraParameters == 2;
   static constexpr int kParameters = Warp::kParameters + Residual::kExtraParameters;
 
   struct Patch {
-    std::array<alignment::Vector2<float>, kPatchPixels> rays;
+    PatchArray ray_x, ray_y;
     std::array<Reference, kPatchPixels> references;
   };
 
@@ -42,7 +42,9 @@ class WindowPatchesOf : public WindowPatches {
     Patch& patch = patches_.emplace_back();
     const auto offsets = alignment::Offsets(Pattern::kDso8);
     for (int k = 0; k < kPatchPixels; ++k) {
-      patch.rays[k] = alignment::RayOf<float>(camera_, pixel + offsets[k]);
+      const auto ray = alignment::RayOf<float>(camera_, pixel + offsets[k]);
+      patch.ray_x(k) = ray.x();
+      patch.ray_y(k) = ray.y();
       patch.references[k] =
           Residual::template MakeReference<float>(host.Sample<float>(pixel + offsets[k]));
     }
@@ -69,15 +71,16 @@ class WindowPatchesOf : public WindowPatches {
   std::optional<double> Cost(int index, double inverse_depth, const KeyframePair& pair,
                              const SampleChannels& image, double scale) const override {
     const Patch& patch = patches_[index];
-    Points points;
-    if (!FindPoints(patch, inverse_depth, pair, image, points)) return std::nullopt;
+    Places places;
+    if (!FindPlaces(patch, inverse_depth, pair, image, places)) return std::nullopt;
     const Residual residual = ResidualOf(pair);
     const auto inverse_scale = static_cast<float>(1 / scale);
     float cost = 0;
     for (int k = 0; k < kPatchPixels; ++k)
       cost += kLoss.Rho(
-          (inverse_scale * residual.template Value<float>(image.Value(points[k].pixel),
-                                                          points[k].A(), patch.references[k]))
+          (inverse_scale * residual.template Value<float>(
+                               image.Value(places[k]), DerivativeAt(patch, k, inverse_depth, pair),
+                               patch.references[k]))
               .squaredNorm());
     return cost;
   }
@@ -86,8 +89,8 @@ class WindowPatchesOf : public WindowPatches {
                                   const SampleChannels& image, double scale,
                                   RelativeEquations& equations) const override {
     const Patch& patch = patches_[index];
-    Points points;
-    if (!FindPoints(patch, inverse_depth, pair, image, points)) return std::nullopt;
+    Places places;
+    if (!FindPlaces(patch, inverse_depth, pair, image, places)) return std::nullopt;
     const Residual residual = ResidualOf(pair);
     const auto inverse_scale = static_cast<float>(1 / scale);
     alignment::NormalEquations<float, kParameters> sum;
@@ -95,10 +98,11 @@ class WindowPatchesOf : public WindowPatches {
     for (int k = 0; k < kPatchPixels; ++k) {
       Point linear;
       if (!WarpOf(pair.linear).At(InputOf(patch, k, inverse_depth), linear)) return std::nullopt;
-      const auto at = image.Sample(points[k].pixel);
+      const auto at = image.Sample(places[k]);
       const Eigen::Matrix<float, kDim, 1> r =
           inverse_scale *
-          residual.template Value<float>(at.value, points[k].A(), patch.references[k]);
+          residual.template Value<float>(at.value, DerivativeAt(patch, k, inverse_depth, pair),
+                                         patch.references[k]);
       Eigen::Matrix<float, kDim, kParameters> J;
       residual.Linearize(at, linear, patch.references[k], J);
       const float s = r.squaredNorm();
@@ -129,18 +133,42 @@ class WindowPatchesOf : public WindowPatches {
   }
 
   static typename Warp::Input InputOf(const Patch& patch, int k, double inverse_depth) {
-    return {patch.rays[k], static_cast<float>(inverse_depth), alignment::Vector2<float>::Zero()};
+    return {{patch.ray_x(k), patch.ray_y(k)},
+            static_cast<float>(inverse_depth),
+            alignment::Vector2<float>::Zero()};
   }
 
-  static bool FindPoints(const Patch& patch, double inverse_depth, const KeyframePair& pair,
-                         const SampleChannels& image, Points& points) {
+  using Places = std::array<alignment::Vector2<float>, kPatchPixels>;
+
+  /// Where a patch's pixels are now: Warp::At() for all at once, without derivatives.
+  /// @return whether all of them are in view.
+  static bool FindPlaces(const Patch& patch, double inverse_depth, const KeyframePair& pair,
+                         const SampleChannels& image, Places& places) {
+    const CameraWarp& warp = pair.now;
+    const auto& to = warp.moved.motion.projector;
+    const alignment::Vector3<float> shift = static_cast<float>(inverse_depth) * to.p + to.R.col(2);
+    const PatchArray ray_x = patch.ray_x * warp.ray_scale.x() + warp.ray_shift.x();
+    const PatchArray ray_y = patch.ray_y * warp.ray_scale.y() + warp.ray_shift.y();
+    const PatchArray z = to.R(2, 0) * ray_x + to.R(2, 1) * ray_y + shift.z();
+    if (!(z.minCoeff() > 1e-3f)) return false;
+    const PatchArray x = to.fx * (to.R(0, 0) * ray_x + to.R(0, 1) * ray_y + shift.x()) / z + to.cx;
+    const PatchArray y = to.fy * (to.R(1, 0) * ray_x + to.R(1, 1) * ray_y + shift.y()) / z + to.cy;
     for (int k = 0; k < kPatchPixels; ++k) {
-      if (!WarpOf(pair.now).At(InputOf(patch, k, inverse_depth), points[k]) ||
-          !image.Inside(points[k].pixel))
-        return false;
-      image.Prefetch(points[k].pixel);
+      places[k] = {x(k), y(k)};
+      if (!image.Inside(places[k])) return false;
+      image.Prefetch(places[k]);
     }
     return true;
+  }
+
+  /// Derivative of the place by the pixel of the host, where the residual asks for it.
+  static Eigen::Matrix2f DerivativeAt(const Patch& patch, int k, double inverse_depth,
+                                      const KeyframePair& pair) {
+    if constexpr (kBrightness) return Eigen::Matrix2f::Identity();  // intensities have none
+    Point point;
+    if (!WarpOf(pair.now).At(InputOf(patch, k, inverse_depth), point))
+      return Eigen::Matrix2f::Identity();
+    return point.A();
   }
 
   /// From the parameters that play a part, brightness last, to all.
