@@ -533,6 +533,71 @@ class Odometry(RepeatedRuns):
         return {f"alignment.{key}": value for key, value in self.columns[column].items()}
 
 
+@dataclass(frozen=True)
+class TableSequence(TrackedSequence):
+    """A sequence of the trajectory table. A cut-out and the whole may have the same folder."""
+
+    least_images: int = 1  # with fewer, or with more than at most, it is not at hand
+    most_images: int = 0  # 0: no limit
+    published: str = ""  # its column in the published table
+
+    def at_hand(self, data: str) -> bool:
+        if self.rendered or not super().at_hand(data):
+            return self.rendered
+        images = count_images(self.path(Path(), data))
+        return images >= self.least_images and not 0 < self.most_images < images
+
+
+@dataclass(frozen=True)
+class TrackingProgram:
+    """A program of the trajectory table: what it takes, and how what it writes is scored."""
+
+    frame: str  # that its poses are of: body or camera
+    align: str  # se3, or sim3 where the scale is not known
+    photometric: bool = False  # it takes `--photometric FOLDER`
+
+
+@dataclass(frozen=True)
+class TrackingColumn:
+    program: str
+    options: dict[str, Any] = field(default_factory=dict)
+    published: str = ""  # its row in the published table
+
+
+@dataclass(frozen=True)
+class TrackingCondition:
+    photometric: bool = False  # rendered sequences come with their photometric calibration
+    changes: dict[str, dict[str, Any]] = field(default_factory=dict)  # by sequence; empty: all, unchanged
+
+
+@dataclass
+class TrajectoryTable(RepeatedRuns):
+    """What runs on which sequences for the paper's Table III, and what counts as success."""
+
+    SCORES_OWN = True
+
+    fail_above_pct: float  # ATE RMSE over the length of the path
+    published: str
+    programs: dict[str, TrackingProgram]
+
+    def change(self, sequence: str, condition: str) -> dict[str, Any] | None:
+        changes = self.conditions[condition].changes
+        return changes.get(sequence) if changes else {}
+
+    def program(self, column: str) -> str:
+        return self.columns[column].program
+
+    def options(self, sequence: str, folder: Path, condition: str, column: str) -> dict[str, Any]:
+        calibrated = self.conditions[condition].photometric and self.sequences[sequence].rendered
+        takes_it = self.programs[self.program(column)].photometric
+        calibration = {"photometric": folder / "mav0" / "cam0"} if calibrated and takes_it else {}
+        return {**self.columns[column].options, **calibration}
+
+    def score_flags(self, column: str) -> list[str]:
+        program = self.programs[self.program(column)]
+        return _command_line({"frame": program.frame, "align": program.align})
+
+
 @dataclass
 class ShiftProfile:
     """What `sgf_study shift-profile` runs."""
@@ -572,7 +637,7 @@ class Sequences:
 
 Experiment = Union[
     ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
-    Odometry, SemiDense, SelfMatch, ShiftProfile,
+    Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
 ]
 
 
@@ -716,6 +781,21 @@ def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
     return study
 
 
+def _build_trajectory_table(node: dict[str, Any], where: str) -> TrajectoryTable:
+    study = _build_on_sequences(TrajectoryTable, node, where, TableSequence)
+    study.programs = _build_each(TrackingProgram, study.programs, f"{where}: programs")
+    study.columns = _build_each(TrackingColumn, study.columns, f"{where}: columns")
+    study.conditions = _build_each(TrackingCondition, study.conditions, f"{where}: conditions")
+    for name, column in study.columns.items():
+        if column.program not in study.programs:
+            raise ConfigError(f"{where}: columns.{name}: no program '{column.program}'")
+    for name, condition in study.conditions.items():
+        if unknown := set(condition.changes) - set(study.sequences):
+            raise ConfigError(f"{where}: conditions.{name}: no sequence {sorted(unknown)}")
+    _check_runs(study, where)
+    return study
+
+
 BUILDERS = {
     "benchmark": partial(_build, Benchmark),
     "contact_sheet": partial(_build, ContactSheet),
@@ -730,6 +810,7 @@ BUILDERS = {
     "sequences": partial(_build, Sequences),
     "shift_profile": partial(_build, ShiftProfile),
     "table": _build_table,
+    "trajectory_table": _build_trajectory_table,
 }
 
 
@@ -775,6 +856,28 @@ def _published_entry(name: str) -> Any:
 def load_published_errors(figure: SelfMatch) -> dict[str, list[float]]:
     """The paper's mean errors (px) of Fig. 1 by column, one per frame of the paper."""
     return _published_entry(figure.published)
+
+
+def load_published_trajectories(table: TrajectoryTable) -> dict[str, dict[str, float]]:
+    """The paper's ATE (m) of each of the table's columns, by the paper's name of the sequence.
+
+    Columns that are not in the paper have none. The average `avg` is as printed.
+    """
+    entry = _published_entry(table.published)
+    if unknown := {column.published for column in table.columns.values()} - {"", *entry}:
+        raise ConfigError(f"{PUBLISHED}: no entry {table.published}.{sorted(unknown)}")
+    return {
+        name: dict(zip(entry["columns"], entry[column.published])) if column.published else {}
+        for name, column in table.columns.items()
+    }
+
+
+def count_images(sequence: Path) -> int:
+    """Images in the list of a sequence in EuRoC's layout; 0 without one."""
+    listing = sequence / "mav0" / "cam0" / "data.csv"
+    if not listing.exists():
+        return 0
+    return sum(1 for line in listing.read_text().splitlines() if line and not line.startswith("#"))
 
 
 def dataset_flags(data: str, generated: str) -> list[str]:
