@@ -6,10 +6,12 @@ names the file.
 
 from __future__ import annotations
 
+import itertools
+from abc import ABC, abstractmethod
 from dataclasses import MISSING, dataclass, field, fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Union
+from typing import Any, ClassVar, Union
 
 import yaml
 
@@ -39,6 +41,11 @@ def _build(cls: type, node: Any, where: str) -> Any:
         if name not in node and f.default is MISSING and f.default_factory is MISSING:
             raise ConfigError(f"{where}: key '{name}' is missing")
     return cls(**node)
+
+
+def _build_each(cls: type, nodes: dict[str, Any], where: str) -> dict[str, Any]:
+    """Makes dataclass `cls` of each of some named YAML maps."""
+    return {name: _build(cls, node, f"{where}.{name}") for name, node in nodes.items()}
 
 
 @dataclass(frozen=True)
@@ -410,6 +417,10 @@ class TrackedSequence:
         """Frames of a run, 0 for all. @param full the full rendered suite, of which runs take all."""
         return 0 if full and self.rendered else self.frames
 
+    def at_hand(self, data: str) -> bool:
+        """Whether it can be had: what is rendered always can. @param data may be empty."""
+        return self.rendered or (bool(data) and self.path(Path(), data).is_dir())
+
 
 @dataclass
 class SequenceExperiment:
@@ -425,11 +436,7 @@ class SequenceExperiment:
 
         @param data folder with downloaded data, may be empty.
         """
-        return [
-            name
-            for name, sequence in self.sequences.items()
-            if sequence.rendered or (data and sequence.path(Path(), data).is_dir())
-        ]
+        return [name for name, sequence in self.sequences.items() if sequence.at_hand(data)]
 
 
 @dataclass
@@ -437,41 +444,158 @@ class MrptMap(SequenceExperiment):
     """Sequences that go through the MRPT module's programs."""
 
 
+def _command_line(flags: dict[str, Any]) -> list[str]:
+    """Names of options and their values as the programs take them."""
+    words = []
+    for name, value in flags.items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        words += [f"--{name.replace('_', '-')}", text]
+    return words
+
+
 @dataclass
-class Odometry(SequenceExperiment):
-    """What `sgf_align` runs on which sequences, and what is compared."""
+class RepeatedRuns(SequenceExperiment, ABC):
+    """Programs that track a camera again and again, from other frames on, and how they compare."""
+
+    SCORES_OWN: ClassVar[bool] = False  # runs are scored on their own poses too, not only on common ones
 
     runs: int  # of each column, unless the command line says otherwise
     first_frames: int  # that runs begin at
     lost_below_pct: float  # frames with a pose
     compared: list[str]
     baselines: list[str]
-    verdict_runs: int  # fewer give no verdict
-    margin_pct: float
-    conditions: dict[str, dict[str, Any]]
-    columns: dict[str, dict[str, Any]]
+    conditions: dict[str, Any]
+    columns: dict[str, Any]
 
     @property
     def undisturbed(self) -> str:
-        """The condition that the others are compared with: the first."""
+        """The condition that changes nothing: the first."""
         return next(iter(self.conditions))
+
+    @property
+    def comparisons(self) -> list[tuple[str, str]]:
+        """Columns and what they are compared with."""
+        return list(itertools.product(self.compared, self.baselines))
+
+    def conditions_of(self, sequence: str) -> list[str]:
+        """The conditions that a sequence is run under."""
+        return [condition for condition in self.conditions if self.change(sequence, condition) is not None]
 
     def first_frame(self, run: int) -> int:
         """Where a run begins: neighbouring runs far apart, all different for as long as that goes."""
         return FIRST_FRAME_STEP * run % self.first_frames
 
-    def flags(self, sequence: str, full: bool, run: int, condition: str, column: str) -> list[str]:
-        """Flags of `sgf_align` for a run, counted from 0. @param full the full rendered suite."""
+    def flags(
+        self, sequence: str, folder: Path, full: bool, run: int, condition: str, column: str
+    ) -> list[str]:
+        """Flags of a column's program for a run, counted from 0.
+
+        @param folder of the sequence. @param full the full rendered suite.
+        """
         frames = self.sequences[sequence].frames_taken(full)
-        change, alignment = self.conditions[condition], self.columns[column]
-        values = {f"change.{key}": value for key, value in {**change, "seed": run + 1}.items()}
-        values |= {f"alignment.{key}": value for key, value in alignment.items()}
+        change = {**(self.change(sequence, condition) or {}), "seed": run + 1}
+        values = {f"change.{key}": value for key, value in change.items()}
+        values |= self.options(sequence, folder, condition, column)
         values |= {"from": self.first_frame(run)} | ({"frames": frames} if frames else {})
-        return [
-            word
-            for key, value in values.items()
-            for word in (f"--{key.replace('_', '-')}", str(value).lower())
-        ]
+        return _command_line(values)
+
+    @abstractmethod
+    def change(self, sequence: str, condition: str) -> dict[str, Any] | None:
+        """What a condition does to a sequence's images; None where it is not run."""
+
+    @abstractmethod
+    def program(self, column: str) -> str:
+        """The program that makes a column."""
+
+    @abstractmethod
+    def options(self, sequence: str, folder: Path, condition: str, column: str) -> dict[str, Any]:
+        """Options of a column's program but those of the change and of the frames."""
+
+    def score_flags(self, column: str) -> list[str]:
+        """Flags of sgf_eval for the column's trajectories."""
+        return []
+
+
+@dataclass
+class Odometry(RepeatedRuns):
+    """What `sgf_align` runs on which sequences, and what is compared."""
+
+    verdict_runs: int  # fewer give no verdict
+    margin_pct: float
+
+    def change(self, sequence: str, condition: str) -> dict[str, Any]:
+        return self.conditions[condition]
+
+    def program(self, column: str) -> str:
+        return "sgf_align"
+
+    def options(self, sequence: str, folder: Path, condition: str, column: str) -> dict[str, Any]:
+        return {f"alignment.{key}": value for key, value in self.columns[column].items()}
+
+
+@dataclass(frozen=True)
+class TableSequence(TrackedSequence):
+    """A sequence of the trajectory table. A cut-out and the whole may have the same folder."""
+
+    least_images: int = 1  # with fewer, or with more than at most, it is not at hand
+    most_images: int = 0  # 0: no limit
+    published: str = ""  # its column in the published table
+
+    def at_hand(self, data: str) -> bool:
+        if self.rendered or not super().at_hand(data):
+            return self.rendered
+        images = count_images(self.path(Path(), data))
+        return images >= self.least_images and not 0 < self.most_images < images
+
+
+@dataclass(frozen=True)
+class TrackingProgram:
+    """A program of the trajectory table: what it takes, and how what it writes is scored."""
+
+    frame: str  # that its poses are of: body or camera
+    align: str  # se3, or sim3 where the scale is not known
+    photometric: bool = False  # it takes `--photometric FOLDER`
+
+
+@dataclass(frozen=True)
+class TrackingColumn:
+    program: str
+    options: dict[str, Any] = field(default_factory=dict)
+    published: str = ""  # its row in the published table
+
+
+@dataclass(frozen=True)
+class TrackingCondition:
+    photometric: bool = False  # rendered sequences come with their photometric calibration
+    changes: dict[str, dict[str, Any]] = field(default_factory=dict)  # by sequence; empty: all, unchanged
+
+
+@dataclass
+class TrajectoryTable(RepeatedRuns):
+    """What runs on which sequences for the paper's Table III, and what counts as success."""
+
+    SCORES_OWN = True
+
+    fail_above_pct: float  # ATE RMSE over the length of the path
+    published: str
+    programs: dict[str, TrackingProgram]
+
+    def change(self, sequence: str, condition: str) -> dict[str, Any] | None:
+        changes = self.conditions[condition].changes
+        return changes.get(sequence) if changes else {}
+
+    def program(self, column: str) -> str:
+        return self.columns[column].program
+
+    def options(self, sequence: str, folder: Path, condition: str, column: str) -> dict[str, Any]:
+        calibrated = self.conditions[condition].photometric and self.sequences[sequence].rendered
+        takes_it = self.programs[self.program(column)].photometric
+        calibration = {"photometric": folder / "mav0" / "cam0"} if calibrated and takes_it else {}
+        return {**self.columns[column].options, **calibration}
+
+    def score_flags(self, column: str) -> list[str]:
+        program = self.programs[self.program(column)]
+        return _command_line({"frame": program.frame, "align": program.align})
 
 
 @dataclass
@@ -513,7 +637,7 @@ class Sequences:
 
 Experiment = Union[
     ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
-    Odometry, SemiDense, SelfMatch, ShiftProfile,
+    Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
 ]
 
 
@@ -544,10 +668,7 @@ def load_sweep(name: str) -> Sweep:
     path = SWEEPS / f"{name}.yaml"
     sweep = _build(Sweep, read_yaml(path), str(path))
     sweep.grid = _build(Grid, sweep.grid, f"{path}: grid")
-    sweep.columns = {
-        column: _build(Column, node, f"{path}: columns.{column}")
-        for column, node in sweep.columns.items()
-    }
+    sweep.columns = _build_each(Column, sweep.columns, f"{path}: columns")
     return sweep
 
 
@@ -598,10 +719,7 @@ def _build_figure(node: dict[str, Any], where: str) -> DisparityFigure:
 def _build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
     figure = _build(SemiDense, node, where)
     figure.rows = [_build(SemiDenseRow, row, f"{where}: rows") for row in figure.rows]
-    figure.columns = {
-        name: _build(SemiDenseColumn, column, f"{where}: columns.{name}")
-        for name, column in figure.columns.items()
-    }
+    figure.columns = _build_each(SemiDenseColumn, figure.columns, f"{where}: columns")
     for key in ("min_gradient", "min_epipolar_gradient", "bad_pct"):
         if key not in figure.study:
             raise ConfigError(f"{where}: study: key '{key}' is missing")
@@ -616,10 +734,7 @@ def _build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
 def _build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
     figure = _build(SelfMatch, node, where)
     figure.groups = [_build(FrameGroup, group, f"{where}: groups") for group in figure.groups]
-    figure.columns = {
-        name: _build(SelfMatchColumn, column, f"{where}: columns.{name}")
-        for name, column in figure.columns.items()
-    }
+    figure.columns = _build_each(SelfMatchColumn, figure.columns, f"{where}: columns")
     if figure.figure_case not in figure.cases:
         raise ConfigError(f"{where}: figure_case '{figure.figure_case}' is not among the cases")
     if unknown := set(figure.figure_columns) - set(figure.columns):
@@ -635,35 +750,49 @@ def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
     study.image_sets = [_build(ImageSet, images, f"{where}: image_sets") for images in study.image_sets]
     if study.image_sets[-1].datasets:
         raise ConfigError(f"{where}: image_sets: the last one must need no data set")
-    study.columns = {
-        name: _build(ConvergenceColumn, column, f"{where}: columns.{name}")
-        for name, column in study.columns.items()
-    }
+    study.columns = _build_each(ConvergenceColumn, study.columns, f"{where}: columns")
     if unknown := set(study.drawn) - set(study.columns):
         raise ConfigError(f"{where}: drawn: no column {sorted(unknown)}")
     return study
 
 
-def _build_on_sequences(cls: type, node: dict[str, Any], where: str) -> Any:
-    """Makes dataclass `cls`, a SequenceExperiment, of a YAML map."""
+def _build_on_sequences(cls: type, node: dict[str, Any], where: str, of: type = TrackedSequence) -> Any:
+    """Makes dataclass `cls`, a SequenceExperiment on sequences `of` a class, of a YAML map."""
     experiment = _build(cls, node, where)
-    experiment.sequences = {
-        name: _build(TrackedSequence, sequence, f"{where}: sequences.{name}")
-        for name, sequence in experiment.sequences.items()
-    }
+    experiment.sequences = _build_each(of, experiment.sequences, f"{where}: sequences")
     return experiment
 
 
-def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
-    study = _build_on_sequences(Odometry, node, where)
+def _check_runs(study: RepeatedRuns, where: str) -> None:
+    """Checks what all experiments with repeated runs share."""
     for key in ("compared", "baselines"):
         if unknown := set(getattr(study, key)) - set(study.columns):
             raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
     for key in ("runs", "first_frames"):
         if getattr(study, key) < 1:
             raise ConfigError(f"{where}: {key} is {getattr(study, key)}; it has to be positive")
-    if study.conditions[study.undisturbed]:
+    if any(study.change(sequence, study.undisturbed) for sequence in study.sequences):
         raise ConfigError(f"{where}: conditions: the first one must change nothing")
+
+
+def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
+    study = _build_on_sequences(Odometry, node, where)
+    _check_runs(study, where)
+    return study
+
+
+def _build_trajectory_table(node: dict[str, Any], where: str) -> TrajectoryTable:
+    study = _build_on_sequences(TrajectoryTable, node, where, TableSequence)
+    study.programs = _build_each(TrackingProgram, study.programs, f"{where}: programs")
+    study.columns = _build_each(TrackingColumn, study.columns, f"{where}: columns")
+    study.conditions = _build_each(TrackingCondition, study.conditions, f"{where}: conditions")
+    for name, column in study.columns.items():
+        if column.program not in study.programs:
+            raise ConfigError(f"{where}: columns.{name}: no program '{column.program}'")
+    for name, condition in study.conditions.items():
+        if unknown := set(condition.changes) - set(study.sequences):
+            raise ConfigError(f"{where}: conditions.{name}: no sequence {sorted(unknown)}")
+    _check_runs(study, where)
     return study
 
 
@@ -681,6 +810,7 @@ BUILDERS = {
     "sequences": partial(_build, Sequences),
     "shift_profile": partial(_build, ShiftProfile),
     "table": _build_table,
+    "trajectory_table": _build_trajectory_table,
 }
 
 
@@ -715,12 +845,39 @@ def load_published(table: Table, matcher: str) -> dict[str, dict[str, float]]:
     }
 
 
+def _published_entry(name: str) -> Any:
+    """An entry of the published values."""
+    entry = read_yaml(PUBLISHED).get(name)
+    if entry is None:
+        raise ConfigError(f"{PUBLISHED}: no entry {name}")
+    return entry
+
+
 def load_published_errors(figure: SelfMatch) -> dict[str, list[float]]:
     """The paper's mean errors (px) of Fig. 1 by column, one per frame of the paper."""
-    entry = read_yaml(PUBLISHED).get(figure.published)
-    if entry is None:
-        raise ConfigError(f"{PUBLISHED}: no entry {figure.published}")
-    return entry
+    return _published_entry(figure.published)
+
+
+def load_published_trajectories(table: TrajectoryTable) -> dict[str, dict[str, float]]:
+    """The paper's ATE (m) of each of the table's columns, by the paper's name of the sequence.
+
+    Columns that are not in the paper have none. The average `avg` is as printed.
+    """
+    entry = _published_entry(table.published)
+    if unknown := {column.published for column in table.columns.values()} - {"", *entry}:
+        raise ConfigError(f"{PUBLISHED}: no entry {table.published}.{sorted(unknown)}")
+    return {
+        name: dict(zip(entry["columns"], entry[column.published])) if column.published else {}
+        for name, column in table.columns.items()
+    }
+
+
+def count_images(sequence: Path) -> int:
+    """Images in the list of a sequence in EuRoC's layout; 0 without one."""
+    listing = sequence / "mav0" / "cam0" / "data.csv"
+    if not listing.exists():
+        return 0
+    return sum(1 for line in listing.read_text().splitlines() if line and not line.startswith("#"))
 
 
 def dataset_flags(data: str, generated: str) -> list[str]:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
-import itertools
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
-from sgf_paper import config, paired, style, text
+from sgf_paper import config, paired, repeated_runs, style, text
 from sgf_paper.config import Odometry
 from sgf_paper.paired import Estimate
+from sgf_paper.repeated_runs import KEYS
 from sgf_paper.style import plt
 
-KEYS = ["sequence", "condition", "column"]
 LINE = [
     *KEYS, "runs", "lost", "posed_pct", "clipped_pct", "ate_mm", "ate_low_mm", "ate_high_mm",
     "ratio", "ratio_low", "ratio_high", "ratio_runs",
@@ -24,26 +21,17 @@ LINE = [
 COMPARED = [
     "sequence", "condition", "column", "baseline", "runs", "ratio", "ratio_low", "ratio_high", "verdict",
 ]  # fmt: skip
-LENGTHS = ["ate", "rpe_half_second", "rpe_one_second"]
-ERRORS = [*(f"{name}_mm" for name in LENGTHS), "rpe_one_second_deg", "orientation_deg"]
+ERRORS = ["ate_mm", "rpe_half_second_mm", "rpe_one_second_mm", "rpe_one_second_deg", "orientation_deg"]
 COLOURS = ["#0072B2", "#D55E00", *style.EXTRA_COLOURS]  # of the conditions
 PANEL_COLUMNS = 2
 
 
 def read_runs(study: Odometry, raw: Path, sequences: list[str], runs: int) -> pd.DataFrame:
     """A line per run; errors in mm and degrees, infinite where a run is lost."""
-    frames = []
-    for sequence in sequences:
-        for run in range(runs):
-            frame = pd.read_csv(raw / sequence / f"run_{run}" / "scores.csv")
-            where = {"sequence": sequence, "run": run, "first_frame": study.first_frame(run)}
-            frames.append(frame.assign(**where))
-    table = pd.concat(frames, ignore_index=True)
-    for name in LENGTHS:
-        table[f"{name}_mm"] = 1000 * table.pop(f"{name}_m")
+    table = repeated_runs.read_scores(study, raw, sequences, runs)
     table.loc[table["lost"], ERRORS] = np.inf
     columns = [*KEYS, "run", "first_frame", "frames", "posed", "lost", "clipped_pct", "compared", *ERRORS]
-    return table[columns].astype({"compared": "Int64"})
+    return table[columns]
 
 
 def errors_by_run(runs: pd.DataFrame) -> pd.DataFrame:
@@ -75,7 +63,7 @@ def make_table(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
             **dict(zip(KEYS, key)),
             "runs": len(own),
             "lost": int(own["lost"].sum()),
-            "posed_pct": (100 * own["posed"] / own["frames"]).mean(),
+            "posed_pct": repeated_runs.posed_pct(own).mean(),
             "clipped_pct": own["clipped_pct"].mean(),
             **own[ERRORS].median(),
             "ate_low_mm": ate.low,
@@ -91,7 +79,7 @@ def compare(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
     errors = errors_by_run(runs)
     lines = []
     for sequence, condition in runs[["sequence", "condition"]].drop_duplicates().itertuples(index=False):
-        for column, baseline in itertools.product(study.compared, study.baselines):
+        for column, baseline in study.comparisons:
             both = (errors[sequence, condition, name] for name in (column, baseline))
             ratio = paired.estimate_median(paired.ratios(*both))
             lines.append({
@@ -131,9 +119,7 @@ def _draw_panel(axis: plt.Axes, study: Odometry, lines: pd.DataFrame) -> None:
             own = lines[(lines["column"] == column) & (lines["condition"] == condition)]
             centre = place + shift * (index - (len(study.conditions) - 1) / 2)
             _draw_column(axis, own, centre, 0.7 * shift, COLOURS[index % len(COLOURS)])
-    axis.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
-    axis.yaxis.set_minor_formatter(NullFormatter())
+    style.label_decades(axis.yaxis)
     axis.set_xticks(range(len(study.columns)), list(study.columns), rotation=25, ha="right")
     axis.tick_params(axis="x", length=0)
     axis.grid(axis="y", which="both", alpha=0.3, linewidth=0.5)
@@ -160,28 +146,16 @@ def draw(study: Odometry, runs: pd.DataFrame) -> plt.Figure:
     return drawing
 
 
-def _estimate(median: float, low: float, high: float, decimals: int) -> str:
-    """A median and its interval; – without one, ∞ where the run in the middle is lost."""
-    if median != median:
-        return "–"
-    shown = (f"{value:.{decimals}f}".replace("inf", "∞") for value in (median, low, high))
-    return "{} [{}, {}]".format(*shown)
-
-
-def _number(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}".replace("inf", "∞")
-
-
 def _row(line: object) -> dict[str, str]:
     return {
         "column": line.column,
         "lost": f"{line.lost}/{line.runs}",
-        "posed": _number(line.posed_pct, 1),
-        "clipped": _number(line.clipped_pct, 2),
-        "ate": _estimate(line.ate_mm, line.ate_low_mm, line.ate_high_mm, 1),
-        "ratio": _estimate(line.ratio, line.ratio_low, line.ratio_high, 2),
-        "rpe": _number(line.rpe_one_second_mm, 1),
-        "rpe_deg": _number(line.rpe_one_second_deg, 2),
+        "posed": text.format_error(line.posed_pct, 1),
+        "clipped": text.format_error(line.clipped_pct, 2),
+        "ate": text.format_estimate(line.ate_mm, line.ate_low_mm, line.ate_high_mm, 1),
+        "ratio": text.format_estimate(line.ratio, line.ratio_low, line.ratio_high, 2),
+        "rpe": text.format_error(line.rpe_one_second_mm, 1),
+        "rpe_deg": text.format_error(line.rpe_one_second_deg, 2),
     }
 
 
@@ -195,7 +169,7 @@ def make_blocks(table: pd.DataFrame) -> list[dict]:
 
 def _compared_rows(compared: pd.DataFrame) -> list[dict]:
     return [
-        {**line._asdict(), "ratio": _estimate(line.ratio, line.ratio_low, line.ratio_high, 2)}
+        {**line._asdict(), "ratio": text.format_estimate(line.ratio, line.ratio_low, line.ratio_high, 2)}
         for line in compared.itertuples()
     ]
 
@@ -207,15 +181,11 @@ def make_odometry(
     study = config.load_experiment(name)
     lines = read_runs(study, raw, sequences, runs)
     table, compared = make_table(study, lines), compare(study, lines)
-    text.write_csv(table, tables / f"{name}.csv")
-    text.write_csv(compared, tables / f"{name}_compared.csv")
-    text.write_csv(lines, tables / f"{name}_runs.csv")
+    frames = {"": table, "_compared": compared, "_runs": lines}
+    repeated_runs.write_csvs(name, tables, frames)
     document = text.render(
         "odometry.md.j2",
-        study=study,
-        runs=runs,
-        sequences={sequence: study.sequences[sequence] for sequence in sequences},
-        absent=[sequence for sequence in study.sequences if sequence not in sequences],
+        **repeated_runs.document_context(study, sequences, runs),
         blocks=make_blocks(table),
         compared=_compared_rows(compared),
     )
@@ -223,17 +193,5 @@ def make_odometry(
     style.save(draw(study, lines), figures, name)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("name", help="experiment of paper/experiments")
-    parser.add_argument("--raw", type=Path, required=True, help="folder of the scores of its runs")
-    parser.add_argument("--sequences", nargs="+", required=True, help="names of those that were run")
-    parser.add_argument("--runs", type=int, required=True, help="number of runs of each column")
-    parser.add_argument("--tables", type=Path, required=True, help="folder for the tables")
-    parser.add_argument("--figures", type=Path, required=True, help="folder for the figure")
-    a = parser.parse_args()
-    make_odometry(a.name, a.raw, a.sequences, a.runs, a.tables, a.figures)
-
-
 if __name__ == "__main__":
-    main()
+    repeated_runs.run_report(__doc__, make_odometry)

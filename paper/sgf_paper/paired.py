@@ -1,20 +1,23 @@
 """Comparison of runs that were made under the same circumstances, one pair each.
 
-An error is infinite where a run is lost. Intervals hold the median at 95 % (Efron's percentile
-bootstrap, 1979); of n runs they hold nothing that n runs do not show, hence a least number of them for
-a verdict.
+An error is infinite where a run is lost. Intervals hold the median or the mean at 95 % (Efron's
+percentile bootstrap, 1979); of n runs they hold nothing that n runs do not show, hence a least number
+of them for a verdict.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
+from scipy import stats
 
 RESAMPLES = 2000
 SEED = 1
 NAN = float("nan")
+ENDS = [0.025, 0.975]  # of intervals
 
 
 @dataclass(frozen=True)
@@ -33,10 +36,19 @@ def estimate_median(of_runs: Sequence[float]) -> Estimate:
     values = values[~np.isnan(values)]
     if values.size == 0:
         return Estimate(NAN, NAN, NAN, 0)
-    chosen = np.random.default_rng(SEED).integers(values.size, size=(RESAMPLES, values.size))
-    medians = np.median(values[chosen], axis=1)
-    low, high = np.quantile(medians, [0.025, 0.975], method="inverted_cdf")  # which copes with infinity
-    return Estimate(float(np.median(values)), float(low), float(high), values.size)
+    medians = np.median(values[_resample(values.size)], axis=1)
+    low, high = quantiles(medians, ENDS)
+    return Estimate(float(np.median(values)), low, high, values.size)
+
+
+def _resample(count: int) -> np.ndarray:
+    """Indices of what is drawn with replacement, a line per resampling."""
+    return np.random.default_rng(SEED).integers(count, size=(RESAMPLES, count))
+
+
+def quantiles(values: Sequence[float], shares: Sequence[float]) -> list[float]:
+    """Values that such shares do not exceed; infinite ones count."""
+    return [float(value) for value in np.quantile(values, shares, method="inverted_cdf")]
 
 
 def ratios(errors: Sequence[float], of_others: Sequence[float]) -> np.ndarray:
@@ -58,3 +70,38 @@ def verdict(ratio: Estimate, least_runs: int, margin_pct: float) -> str:
     if ratio.high < 1:
         return "better"
     return "worse" if ratio.low > 1 else "undecided"
+
+
+@dataclass(frozen=True)
+class SuccessDifference:
+    """Which runs of a column and of its baseline succeed, pair by pair."""
+
+    pairs: int
+    both: int
+    only_own: int
+    only_baseline: int
+    difference_pct: float  # of the shares of successes, own minus the baseline's
+    low_pct: float
+    high_pct: float
+    p: float  # of McNemar's exact test of the pairs in which one succeeds
+
+
+def compare_success(
+    own: Sequence[bool], of_baseline: Sequence[bool], clusters: Sequence[Hashable]
+) -> SuccessDifference:
+    """Compares successes given in the same order.
+
+    @param clusters of each pair: pairs of one cluster see the same images, and are drawn together.
+    """
+    a, b = np.asarray(own, dtype=bool), np.asarray(of_baseline, dtype=bool)
+    only_own, only_baseline = int((a & ~b).sum()), int((b & ~a).sum())
+    differing = only_own + only_baseline
+    p = stats.binomtest(only_own, differing).pvalue if differing else 1.0
+    of_pair = pd.DataFrame({"gain": a.astype(int) - b, "pairs": 1})
+    of_cluster = of_pair.groupby(pd.Series(list(clusters))).sum().to_numpy()
+    gain, pairs = of_cluster[_resample(len(of_cluster))].sum(axis=1).T
+    low, high = quantiles(100 * gain / pairs, ENDS)
+    difference_pct = 100 * (only_own - only_baseline) / a.size
+    return SuccessDifference(
+        a.size, int((a & b).sum()), only_own, only_baseline, difference_pct, low, high, float(p)
+    )

@@ -9,6 +9,8 @@ import matplotlib
 matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt  # noqa: E402  (the backend comes first)
+from matplotlib.axis import Axis  # noqa: E402
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter  # noqa: E402
 
 # Colours that the colour-blind can tell apart (Okabe and Ito), one for each of the paper's columns.
 COLOURS = {
@@ -34,6 +36,13 @@ def line_style(column: str, extra_columns: list[str]) -> dict:
         "linestyle": EXTRA_DASHES[index // len(EXTRA_COLOURS) % len(EXTRA_DASHES)],
         "linewidth": 1.0,
     }
+
+
+def label_decades(axis: Axis) -> None:
+    """Labels 1, 2 and 5 of each decade of a logarithmic axis as plain numbers."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def save(figure: plt.Figure, out: Path, name: str) -> None:

@@ -23,6 +23,7 @@ FILES = {
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
     "shift_profile": "figures/{0}.png (.pdf), tables/{0}.csv (_minima.csv)",
+    "trajectory_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _compared.csv, _runs.csv)",
 }
 MAIN_FILE = {
     "table": "tables/{}.csv",
@@ -38,6 +39,7 @@ MAIN_FILE = {
     "semi_dense": "tables/{}.csv",
     "self_match": "tables/{}.csv",
     "shift_profile": "tables/{}.csv",
+    "trajectory_table": "tables/{}.csv",
 }
 
 
@@ -140,18 +142,31 @@ def _light_change_lines(path: Path) -> list[str]:
     return lines
 
 
-def _odometry_lines(path: Path) -> list[str]:
-    """Per sequence and condition the columns by their ATE, and how many runs were lost."""
+def _odometry_lines(path: Path, counted: str = "lost") -> list[str]:
+    """Per sequence and condition the columns by their ATE, and how many runs were lost, or else `counted`."""
     frame = pd.read_csv(path)
     lines = []
     for (sequence, condition), rows in frame.groupby(["sequence", "condition"], sort=False):
         order = rows.sort_values("ate_mm", kind="stable")
         texts = [
-            f"{row.column} {row.ate_mm:.1f}" + (f" ({row.lost}/{row.runs} lost)" if row.lost else "")
+            f"{row.column} {row.ate_mm:.1f}"
+            + (f" ({count}/{row.runs} {counted})" if (count := getattr(row, counted)) else "")
             for row in order.itertuples()
         ]
         lines.append(f"{sequence}, {condition}, median ATE mm: {', '.join(texts)}")
     return lines
+
+
+def _trajectory_table_lines(path: Path) -> list[str]:
+    """Per condition what succeeds of all sequences together, then the errors of each."""
+    compared = pd.read_csv(path.with_name(f"{path.stem}_compared.csv"))
+    lines = [
+        f"{row.condition}, success by {row.rule} rule, {row.pairs} pairs of runs:"
+        f" {row.column} {row.both + row.only_own}, {row.baseline} {row.both + row.only_baseline},"
+        f" difference {row.difference_pct:+.0f} [{row.low_pct:+.0f}, {row.high_pct:+.0f}] %, p = {row.p:.2g}"
+        for row in compared.itertuples()
+    ]
+    return lines + _odometry_lines(path, "failed")
 
 
 def _measured(stage: Experiment, results: Path) -> list[str]:
@@ -171,6 +186,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _odometry_lines(main_file(stage, results))
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
+    if stage.kind == "trajectory_table":
+        return _trajectory_table_lines(main_file(stage, results))
     return []
 
 

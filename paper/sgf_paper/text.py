@@ -60,6 +60,19 @@ def format_number(value: float, decimals: int) -> str:
     return "" if value != value else f"{value:.{decimals}f}"
 
 
+def format_error(value: float, decimals: int) -> str:
+    """An error with so many decimals, ∞ where the run failed."""
+    return f"{value:.{decimals}f}".replace("inf", "∞")
+
+
+def format_estimate(median: float, low: float, high: float, decimals: int) -> str:
+    """A median and its interval; – without one, ∞ where the run in the middle failed."""
+    if median != median:
+        return "–"
+    shown = (format_error(value, decimals) for value in (median, low, high))
+    return "{} [{}, {}]".format(*shown)
+
+
 def write_csv(frame: pd.DataFrame, path: Path) -> None:
     """Writes a CSV file with numbers of four decimals; the paper's values as printed there."""
     shown = frame.copy()

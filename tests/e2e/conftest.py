@@ -39,14 +39,18 @@ def drop_extra_columns(file):
     file.write_text(yaml.safe_dump(sweep, default_flow_style=None, sort_keys=False))
 
 
-def shorten_odometry(file):
-    """Keeps the first of the rendered sequences, two columns, and one run."""
+def shorten_runs(file, kept):
+    """Keeps one of the rendered sequences, two columns, and one run."""
     study = yaml.safe_load(file.read_text())
-    for name in [name for name, sequence in study["sequences"].items() if "rendered" in sequence][1:]:
+    rendered = [name for name, sequence in study["sequences"].items() if "rendered" in sequence]
+    for name in set(rendered) - {kept}:
         del study["sequences"][name]
+        for condition in study["conditions"].values():
+            condition.get("changes", {}).pop(name, None)
     study |= {"runs": 1, "compared": ["sgf"], "baselines": ["photo"]}
     study["columns"] = {name: study["columns"][name] for name in ("sgf", "photo")}
-    file.write_text(yaml.safe_dump(study, sort_keys=False))
+    title = study.pop("title")  # reproduce.sh reads it in double quotes
+    file.write_text(f'title: "{title}"\n{yaml.safe_dump(study, sort_keys=False)}')
 
 
 class Project:
@@ -70,9 +74,11 @@ class Project:
             shutil.copy2(PROJECT / file, self.root / file)
         for sweep in (self.root / "paper" / "sweeps").iterdir():
             drop_extra_columns(sweep)
-        for study in (self.root / "paper" / "experiments").glob("odometry*.yaml"):
-            shorten_odometry(study)
-        light_change = self.root / "paper" / "experiments" / "light_change.yaml"
+        experiments = self.root / "paper" / "experiments"
+        shorten_runs(experiments / "odometry.yaml", "V1_03_difficult")
+        for name in ("odometry_parts", "table3"):
+            shorten_runs(experiments / f"{name}.yaml", "MH_03_medium")
+        light_change = experiments / "light_change.yaml"
         light_change.write_text(light_change.read_text().replace(", census]", "]"))
 
     def environment(self, **more):
@@ -116,7 +122,7 @@ class Project:
         return file.read_text().splitlines() if file.exists() else []
 
     def trackings(self):
-        """`sequence residual seed` for each run of the stand-in for sgf_align."""
+        """`sequence residual seed` and further notes of each run of the stand-in for sgf_align."""
         file = self.bin / "trackings"
         return file.read_text().splitlines() if file.exists() else []
 

@@ -13,8 +13,9 @@ COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_co
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 ODOMETRY = ["odometry", "odometry_parts"]
+TRACKED = [*ODOMETRY, "table3"]
 # These need no data set.
-RENDERED = ["convergence", "fig1", "fig2", "fig3", "mrpt_map", *ODOMETRY, "scenes", "sequences"]
+RENDERED = ["convergence", "fig1", "fig2", "fig3", "mrpt_map", *TRACKED, "scenes", "sequences"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -26,7 +27,8 @@ FILES = {
     + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
     + ["convergence.csv", "convergence.md", "mrpt_map.csv", "mrpt_map.md"]
-    + [f"{name}{end}" for name in ODOMETRY for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
+    + [f"{name}{end}" for name in TRACKED for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
+    + ["table3.tex"]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
@@ -62,6 +64,8 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     assert "motorcycle_741x500: sgf_sgm 1.20 times cv::StereoSGBM (avx3, 1 thread)" in summary
     assert "light, converged from 2 px, %: photo 90, lssd 89, gn 88, sgf" in summary
     assert "V1_03_difficult, light, median ATE mm: sgf 1.0, photo inf (1/1 lost)" in summary
+    assert "light, success by scale rule, 1 pairs of runs: sgf 1, photo 0, difference +100" in summary
+    assert "MH_03_medium, light, median ATE mm: sgf 1.0, photo inf (1/1 failed)" in summary
     assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
     assert "checked, kept, median / 90th percentile of depth errors: sad 60 %, 1.0 / 20.0 cm" in summary
     assert "V1_02_medium: 10 of 10 frames with pose, 2 key-frames, 3 points, ATE RMSE 1.0 mm" in summary
@@ -259,7 +263,7 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
     "command, log, lost",
     [
         ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
-        ("sequence", "sequences_run.log", ["mrpt_map", *ODOMETRY, "sequences"]),
+        ("sequence", "sequences_run.log", ["mrpt_map", *TRACKED, "sequences"]),
     ],
 )
 def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):
@@ -355,3 +359,29 @@ def test_a_changed_condition_makes_its_runs_anew(project):
     code, output = project.run("--only", "odometry")
     assert code == 0 and "odometry       made" in output, output
     assert len(project.trackings()) == 4 + 2
+
+
+def test_table_3_takes_the_calibration_of_what_is_rendered_and_tells_cuts_from_the_whole(project):
+    cut, whole = (project.data / "euroc" / name for name in ("MH_01_easy", "MH_02_easy"))
+    for folder, images in ((cut, 999), (whole, 1000)):
+        camera = folder / "mav0" / "cam0"
+        camera.mkdir(parents=True)
+        (camera / "data.csv").write_text("#timestamp [ns],filename\n" + "1,1.png\n" * images)
+    code, output = project.run("--only", "table3", "--data", str(project.data))
+    assert code == 0, output
+    assert sorted(project.trackings()) == sorted(
+        [f"MH_03_medium {residual} 1{note}" for residual in ("photo", "sgf") for note in ("", " calibrated")]
+        + [f"{folder.name} {residual} 1" for folder in (cut, whole) for residual in ("photo", "sgf")]
+    )
+    table = rows(project.results / "tables" / "table3.csv")
+    assert [(row["sequence"], row["condition"], row["column"], row["published_mm"]) for row in table] == [
+        ("MH_03_medium", "undisturbed", "sgf", ""),
+        ("MH_03_medium", "undisturbed", "photo", ""),
+        ("MH_03_medium", "light", "sgf", ""),
+        ("MH_03_medium", "light", "photo", ""),
+        ("euroc_MH_01_cut", "undisturbed", "sgf", ""),
+        ("euroc_MH_01_cut", "undisturbed", "photo", ""),
+        ("euroc_MH_02", "undisturbed", "sgf", "50.0000"),
+        ("euroc_MH_02", "undisturbed", "photo", "45.0000"),
+    ]
+    assert not list((project.results / "raw" / "table3").rglob("*.ply")), "maps are large"

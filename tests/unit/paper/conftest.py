@@ -1,16 +1,31 @@
 """Small raw scores whose tables can be worked out by hand."""
 
 import itertools
+import json
 
+import pandas as pd
 import pytest
 
-from sgf_paper import config
+from sgf_paper import config, odometry_scores
 from sgf_paper.config import Column, Dataset, Grid, Sweep, Table, TableBlock, Tuning
 
 HEADER = (
     "dataset,scene,region,matcher,column,window,uniqueness,truth_px,matched_px,"
     "mean_px,bad1_pct,bad2_pct,bad4_pct,d1_pct,invalid_pct,seconds\n"
 )
+# Notes its arguments and says that the errors are as large as the number in the trajectory's file, and all
+# that is a success is one.
+SGF_EVAL = """#!/usr/bin/python3
+import json, pathlib, sys
+estimate = pathlib.Path(sys.argv[2])
+with open(pathlib.Path(__file__).with_name("calls"), "a") as calls:
+    print(*sys.argv[1:], sep="\\t", file=calls)
+error = json.loads(estimate.read_text())
+names = json.loads(pathlib.Path(__file__).with_name("names").read_text())
+out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
+scores = {name: name.startswith("success") or error for name in names}
+out.write_text(json.dumps({"poses": 99, **scores}))
+"""
 
 
 @pytest.fixture
@@ -109,3 +124,46 @@ def experiments(tmp_path, monkeypatch):
 @pytest.fixture
 def datasets(tmp_path):
     return {"toys": Dataset("toys", tmp_path / "toys", 3)}
+
+
+@pytest.fixture
+def sgf_eval(tmp_path):
+    """A stand-in for sgf_eval, and what says how it was called: a list of words per call."""
+    program = tmp_path / "sgf_eval"
+    program.write_text(SGF_EVAL)
+    program.chmod(0o755)
+    names = [*odometry_scores.ERRORS, *odometry_scores.OWN_SCORES]
+    (tmp_path / "names").write_text(json.dumps(names))
+    return program, lambda: [line.split("\t") for line in (tmp_path / "calls").read_text().splitlines()]
+
+
+@pytest.fixture
+def write_runs(tmp_path):
+    """Writes what programs leave of runs that begin alike: an error and poses of 100 frames by column."""
+
+    def write(conditions, errors, posed):
+        folder = tmp_path / "run_0"
+        for condition, column in itertools.product(conditions, errors):
+            run = folder / condition / column
+            run.mkdir(parents=True)
+            (run / "trajectory.txt").write_text(str(errors[column]))
+            summary = {"frames": 100, "posed": posed[column], "clipped_share": 0.0125}
+            (run / "summary.json").write_text(json.dumps(summary))
+        return folder
+
+    return write
+
+
+@pytest.fixture
+def write_scores(tmp_path):
+    """Writes the scores of the runs of a sequence: a list of lines for each run; returns the raw folder."""
+
+    def write(study, sequence, runs):
+        for run, lines in enumerate(runs):
+            folder = tmp_path / "raw" / sequence / f"run_{run}"
+            folder.mkdir(parents=True)
+            table = pd.DataFrame(lines, columns=odometry_scores.columns_of(study))
+            table.to_csv(folder / "scores.csv", index=False)
+        return tmp_path / "raw"
+
+    return write

@@ -1,7 +1,6 @@
 """Odometry under changing light: how runs are started and scored, and what becomes of lost ones."""
 
 import copy
-import json
 import math
 from pathlib import Path
 
@@ -21,17 +20,6 @@ ATE_MM = {
     "bit_planes": ([20, 40, 60], [40, math.inf, 60]),
     "photo": ([5, 5, math.inf], [math.inf] * 3),
 }
-# Notes its arguments and says that the errors are as large as the number in the trajectory's file.
-SGF_EVAL = """#!/usr/bin/python3
-import json, pathlib, sys
-estimate = pathlib.Path(sys.argv[2])
-with open(pathlib.Path(__file__).with_name("calls"), "a") as calls:
-    print(*sys.argv[1:], sep="\\t", file=calls)
-error = json.loads(estimate.read_text())
-names = json.loads(pathlib.Path(__file__).with_name("names").read_text())
-out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
-out.write_text(json.dumps({"poses": 99, **dict.fromkeys(names, error)}))
-"""
 
 
 @pytest.fixture
@@ -72,83 +60,71 @@ def test_downloaded_sequences_join_the_rendered_ones(study, tmp_path):
 
 def test_runs_begin_at_different_frames_with_exposures_of_their_own(study):
     assert sorted(study.first_frame(run) for run in range(15)) == list(range(15))
-    first, second = (study.flags("MH_03_medium", False, run, "light", "sgf") for run in (0, 1))
+    first, second = (
+        study.flags("MH_03_medium", Path(), False, run, "light", "sgf") for run in (0, 1)
+    )
     flags = dict(zip(second[::2], second[1::2]))
     assert flags["--alignment.residual"] == "sgf"
     assert flags["--change.exposure-low"] == "0.5" and flags["--change.encode"] == "false"
     assert flags["--from"] == str(study.first_frame(1)) != "0" and flags["--change.seed"] == "2"
     assert flags["--frames"] == "50"
     assert first[first.index("--change.seed") + 1] == "1"
-    assert "--frames" in study.flags("euroc_MH_01", True, 0, "light", "sgf")
+    assert "--frames" in study.flags("euroc_MH_01", Path(), True, 0, "light", "sgf")
     for name, full in (("MH_03_medium", True), ("kitti_90", False)):
-        assert "--frames" not in study.flags(name, full, 0, "light", "sgf")
-    assert "--change.gamma" not in study.flags("MH_03_medium", False, 0, "undisturbed", "sgf")
+        assert "--frames" not in study.flags(name, Path(), full, 0, "light", "sgf")
+    assert "--change.gamma" not in study.flags("MH_03_medium", Path(), False, 0, "undisturbed", "sgf")
 
 
 @pytest.fixture
-def runs(study, tmp_path):
+def runs(study, write_runs):
     """What sgf_align leaves of the runs that begin alike: `photo` has a pose too few."""
-    folder = tmp_path / "run_0"
-    for condition in study.conditions:
-        for error, column in enumerate(study.columns, 1):
-            run = folder / condition / column
-            run.mkdir(parents=True)
-            (run / "trajectory.txt").write_text(str(error))
-            posed = 94 if column == "photo" else 95
-            (run / "summary.json").write_text(
-                json.dumps({"frames": 100, "posed": posed, "clipped_share": 0.0125})
-            )
-    return folder
+    errors = {column: error for error, column in enumerate(study.columns, 1)}
+    posed = {column: 94 if column == "photo" else 95 for column in study.columns}
+    return write_runs(study.conditions, errors, posed)
 
 
-@pytest.fixture
-def program(tmp_path):
-    program = tmp_path / "sgf_eval"
-    program.write_text(SGF_EVAL)
-    program.chmod(0o755)
-    (tmp_path / "names").write_text(json.dumps(list(odometry_scores.ERRORS)))
-    return program
-
-
-def test_lost_runs_have_no_errors_and_no_part_in_those_of_others(study, runs, program, tmp_path):
-    table = odometry_scores.score(study, runs, program, tmp_path / "sequence").set_index("column")
+def test_lost_runs_have_no_errors_and_no_part_in_those_of_others(study, runs, sgf_eval, tmp_path):
+    program, calls = sgf_eval
+    folder = tmp_path / "sequence"
+    table = odometry_scores.score(study, "MH_03_medium", folder, runs, program).set_index("column")
     assert list(table["lost"]) == [False, False, True] * 2
     assert table["ate_m"].isna().equals(table["lost"])
     assert list(table.loc["bit_planes", "ate_m"]) == [2, 2] and table.loc["sgf", "posed"].iloc[0] == 95
     assert (table["clipped_pct"] == 1.25).all()
-    calls = [line.split("\t") for line in (tmp_path / "calls").read_text().splitlines()]
-    assert len(calls) == 4
-    for call in calls:
+    assert len(calls()) == 4
+    for call in calls():
         common = call[call.index("--common") + 1 :]
         assert len({call[1], *common}) == 4 and not any("photo" in file for file in common)
-        assert call[2:4] == ["--sequence", str(tmp_path / "sequence")]
+        assert call[2:5] == ["--sequence", str(folder), "--out"]
 
 
-def test_common_frames_too_few_for_errors_are_an_error(study, runs, program, tmp_path):
+def test_common_frames_too_few_for_errors_are_an_error(study, runs, sgf_eval, tmp_path):
     (runs / "light" / "sgf" / "trajectory.txt").write_text("null")
     with pytest.raises(odometry_scores.ScoresError, match="light/sgf/trajectory.txt: 99 common"):
-        odometry_scores.score(study, runs, program, tmp_path)
+        odometry_scores.score(study, "MH_03_medium", tmp_path, runs, sgf_eval[0])
 
 
 @pytest.fixture
-def raw(study, tmp_path):
+def raw(study, write_scores):
     """Scores of three runs on one sequence."""
-    for run in range(3):
-        lines = []
-        for index, condition in enumerate(study.conditions):
-            for column, errors in ATE_MM.items():
-                error = errors[index][run]
-                lost = math.isinf(error)
-                line = {"condition": condition, "column": column, "frames": 60, "posed": 30 if lost else 60}
-                line |= {"lost": lost, "clipped_pct": run}
-                scores = dict.fromkeys(odometry_scores.ERRORS.values(), error / 1000)
-                scores |= {"rpe_one_second_deg": 1.5, "compared": 60}
-                lines.append(line | ({} if lost else scores))
-        folder = tmp_path / "raw" / "MH_03_medium" / f"run_{run}"
-        folder.mkdir(parents=True)
-        table = pd.DataFrame(lines, columns=odometry_scores.COLUMNS)
-        table.to_csv(folder / "scores.csv", index=False)
-    return tmp_path / "raw"
+
+    def line(condition, column, run, error):
+        lost = math.isinf(error)
+        counts = {"condition": condition, "column": column, "frames": 60, "posed": 30 if lost else 60}
+        counts |= {"lost": lost, "clipped_pct": run}
+        scores = dict.fromkeys(odometry_scores.ERRORS.values(), error / 1000)
+        scores |= {"rpe_one_second_deg": 1.5, "compared": 60}
+        return counts | ({} if lost else scores)
+
+    runs = [
+        [
+            line(condition, column, run, errors[index][run])
+            for index, condition in enumerate(study.conditions)
+            for column, errors in ATE_MM.items()
+        ]
+        for run in range(3)
+    ]
+    return write_scores(study, "MH_03_medium", runs)
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sgf_paper.paired import Estimate, estimate_median, ratios, verdict
+from sgf_paper.paired import Estimate, compare_success, estimate_median, quantiles, ratios, verdict
 
 INF, NAN = math.inf, math.nan
 
@@ -50,3 +50,33 @@ def test_ratios_have_nothing_to_say_where_both_are_lost():
 )
 def test_a_verdict_takes_enough_runs_and_an_interval_on_one_side(low, high, runs, said):
     assert verdict(Estimate(1.0, low, high, runs), least_runs=10, margin_pct=5) == said
+
+
+def test_quantiles_are_values_of_runs_and_hold_infinite_ones():
+    assert quantiles([4.0, 1.0, INF, 2.0], [0.5, 0.75, 0.9]) == [2, 4, INF]
+
+
+def test_success_is_compared_by_the_pairs_that_differ():
+    own = [True] * 12 + [False] * 8
+    baseline = [True] * 4 + [False] * 15 + [True]
+    found = compare_success(own, baseline, range(20))
+    assert (found.pairs, found.both, found.only_own, found.only_baseline) == (20, 4, 8, 1)
+    assert found.difference_pct == pytest.approx(35)
+    # two-sided binomial: 2 * (1 + 9) / 2^9
+    assert found.p == pytest.approx(20 / 512)
+    # 0.35 +- 1.96 * sqrt((9/20 - 0.35^2) / 20) by the normal approximation
+    assert found.low_pct == pytest.approx(10, abs=5) and found.high_pct == pytest.approx(60, abs=5)
+
+
+def test_pairs_that_see_the_same_images_are_drawn_together():
+    own, baseline = [True] * 10 + [False] * 10, [False] * 20
+    apart = compare_success(own, baseline, range(20))
+    together = compare_success(own, baseline, [("a", k // 10) for k in range(20)])
+    assert apart.difference_pct == together.difference_pct == 50
+    assert 20 < apart.low_pct < apart.high_pct < 80
+    assert (together.low_pct, together.high_pct) == (0, 100)
+
+
+def test_pairs_that_never_differ_show_nothing():
+    found = compare_success([True, False], [True, False], "ab")
+    assert (found.p, found.difference_pct, found.low_pct, found.high_pct) == (1, 0, 0, 0)
