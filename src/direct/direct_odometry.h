@@ -44,8 +44,8 @@ struct DirectOptions {
   int active_points = 1000;
   int keyframes = 7;
   int min_keyframes = 5;
-  double keyframe_flow = 0.045;
-  double keyframe_parallax = 0.022;
+  double keyframe_flow = 0.06;
+  double keyframe_parallax = 0.03;
   double keyframe_brightness = 0.5;
   double keyframe_inliers = 0.8;
   int lost_frames = 5;
