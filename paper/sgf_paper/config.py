@@ -41,6 +41,15 @@ def _build(cls: type, node: Any, where: str) -> Any:
     return cls(**node)
 
 
+def _as_flags(values: dict[str, Any]) -> list[str]:
+    """Options of a program, by their dotted names, as words of its command line."""
+    return [
+        word
+        for key, value in values.items()
+        for word in (f"--{key.replace('_', '-')}", str(value).lower())
+    ]
+
+
 @dataclass(frozen=True)
 class Column:
     """One way of matching: a column of the paper's tables."""
@@ -437,6 +446,45 @@ class MrptMap(SequenceExperiment):
     """Sequences that go through the MRPT module's programs."""
 
 
+@dataclass(frozen=True)
+class MapPoints:
+    """Which points of a map are shown and measured."""
+
+    min_support: int  # key-frames that a point was seen in
+    max_variance: float  # of its inverse depth, over the square of that
+
+
+@dataclass(frozen=True)
+class OffSurface:
+    """How points are measured against the true surface."""
+
+    far_m: float  # off it
+    doubled_m: list[float]  # least and largest distance of a second wall's points
+    cell_m: float  # side of the cells that a spread is taken in
+    cell_points: int  # a cell with fewer has no spread
+
+
+@dataclass
+class DirectMap(SequenceExperiment):
+    """What `sgf_direct` runs on which sequences, and how its maps are measured."""
+
+    points: MapPoints
+    surface: OffSurface
+    change: dict[str, Any]
+    columns: dict[str, dict[str, Any]]
+
+    def flags(self, sequence: str, full: bool, column: str) -> list[str]:
+        """Flags of `sgf_direct`. @param full the full rendered suite."""
+        frames = self.sequences[sequence].frames_taken(full)
+        values = {f"change.{key}": value for key, value in self.change.items()}
+        return _as_flags(values | self.columns[column] | ({"frames": frames} if frames else {}))
+
+    def scene(self, sequence: str) -> str:
+        """Scene that a rendered sequence shows; empty for others, whose surface is not known."""
+        shown = self.sequences[sequence]
+        return read_yaml(RECIPES / f"{shown.folder}.yaml")["scene"] if shown.rendered else ""
+
+
 @dataclass
 class Odometry(SequenceExperiment):
     """What `sgf_align` runs on which sequences, and what is compared."""
@@ -467,11 +515,7 @@ class Odometry(SequenceExperiment):
         values = {f"change.{key}": value for key, value in {**change, "seed": run + 1}.items()}
         values |= {f"alignment.{key}": value for key, value in alignment.items()}
         values |= {"from": self.first_frame(run)} | ({"frames": frames} if frames else {})
-        return [
-            word
-            for key, value in values.items()
-            for word in (f"--{key.replace('_', '-')}", str(value).lower())
-        ]
+        return _as_flags(values)
 
 
 @dataclass
@@ -512,8 +556,8 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
-    Odometry, SemiDense, SelfMatch, ShiftProfile,
+    ContactSheet, Convergence, Sequences, Table, Density, DirectMap, LightChange, DisparityFigure, Benchmark,
+    MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile,
 ]
 
 
@@ -654,6 +698,18 @@ def _build_on_sequences(cls: type, node: dict[str, Any], where: str) -> Any:
     return experiment
 
 
+def _build_direct_map(node: dict[str, Any], where: str) -> DirectMap:
+    figure = _build_on_sequences(DirectMap, node, where)
+    figure.points = _build(MapPoints, figure.points, f"{where}: points")
+    figure.surface = _build(OffSurface, figure.surface, f"{where}: surface")
+    limits = figure.surface.doubled_m
+    if len(limits) != 2 or not 0 <= limits[0] < limits[1]:
+        raise ConfigError(f"{where}: surface: doubled_m is {limits}; it has to be two distances, least first")
+    if figure.surface.cell_m <= 0 or figure.surface.cell_points < 2:
+        raise ConfigError(f"{where}: surface: cells have to have a size and two points or more")
+    return figure
+
+
 def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
     study = _build_on_sequences(Odometry, node, where)
     for key in ("compared", "baselines"):
@@ -672,6 +728,7 @@ BUILDERS = {
     "contact_sheet": partial(_build, ContactSheet),
     "convergence": _build_convergence,
     "density": partial(_build, Density),
+    "direct_map": _build_direct_map,
     "disparity_figure": _build_figure,
     "light_change": _build_light_change,
     "mrpt_map": partial(_build_on_sequences, MrptMap),
