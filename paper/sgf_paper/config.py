@@ -453,6 +453,45 @@ def _command_line(flags: dict[str, Any]) -> list[str]:
     return words
 
 
+@dataclass(frozen=True)
+class MapPoints:
+    """Which points of a map are shown and measured."""
+
+    min_support: int  # key-frames that a point was seen in
+    max_variance: float  # of its inverse depth, over the square of that
+
+
+@dataclass(frozen=True)
+class OffSurface:
+    """How points are measured against the true surface."""
+
+    far_m: float  # off it
+    doubled_m: list[float]  # least and largest distance of a second wall's points
+    cell_m: float  # side of the cells that a spread is taken in
+    cell_points: int  # a cell with fewer has no spread
+
+
+@dataclass
+class DirectMap(SequenceExperiment):
+    """What `sgf_direct` runs on which sequences, and how its maps are measured."""
+
+    points: MapPoints
+    surface: OffSurface
+    change: dict[str, Any]
+    columns: dict[str, dict[str, Any]]
+
+    def flags(self, sequence: str, full: bool, column: str) -> list[str]:
+        """Flags of `sgf_direct`. @param full the full rendered suite."""
+        frames = self.sequences[sequence].frames_taken(full)
+        values = {f"change.{key}": value for key, value in self.change.items()}
+        return _command_line(values | self.columns[column] | ({"frames": frames} if frames else {}))
+
+    def scene(self, sequence: str) -> str:
+        """Scene that a rendered sequence shows; empty for others, whose surface is not known."""
+        shown = self.sequences[sequence]
+        return read_yaml(RECIPES / f"{shown.folder}.yaml")["scene"] if shown.rendered else ""
+
+
 @dataclass
 class RepeatedRuns(SequenceExperiment, ABC):
     """Programs that track a camera again and again, from other frames on, and how they compare."""
@@ -636,8 +675,8 @@ class Sequences:
 
 
 Experiment = Union[
-    ContactSheet, Convergence, Sequences, Table, Density, LightChange, DisparityFigure, Benchmark, MrptMap,
-    Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
+    ContactSheet, Convergence, Sequences, Table, Density, DirectMap, LightChange, DisparityFigure, Benchmark,
+    MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
 ]
 
 
@@ -763,8 +802,8 @@ def _build_on_sequences(cls: type, node: dict[str, Any], where: str, of: type = 
     return experiment
 
 
-def _check_runs(study: RepeatedRuns, where: str) -> None:
-    """Checks what all experiments with repeated runs share."""
+    ContactSheet, Convergence, Sequences, Table, Density, DirectMap, LightChange, DisparityFigure, Benchmark,
+    MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
     for key in ("compared", "baselines"):
         if unknown := set(getattr(study, key)) - set(study.columns):
             raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
@@ -801,6 +840,7 @@ BUILDERS = {
     "contact_sheet": partial(_build, ContactSheet),
     "convergence": _build_convergence,
     "density": partial(_build, Density),
+    "direct_map": _build_direct_map,
     "disparity_figure": _build_figure,
     "light_change": _build_light_change,
     "mrpt_map": partial(_build_on_sequences, MrptMap),

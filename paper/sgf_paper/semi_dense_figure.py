@@ -24,7 +24,7 @@ ERRORS = matplotlib.colors.LinearSegmentedColormap.from_list(
 ERROR_LIMIT = 0.2  # depth error over true depth at which the colours end
 INSIDE = 0.99  # share of the true points, along each axis, that the panels hold besides a margin
 MARGIN = 0.08  # of their extent
-PLY_TYPES = {"float": "<f4", "uchar": "u1"}
+PLY_TYPES = {"float": "<f4", "int": "<i4", "uchar": "u1"}
 
 
 class PlyError(Exception):

@@ -12,6 +12,7 @@ from sgf_paper.config import Dataset, Experiment
 FILES = {
     "table": "tables/{}.md (.csv, .tex, _scenes.csv, _wins.csv, _tuned.csv)",
     "density": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _equal.csv)",
+    "direct_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "disparity_figure": "figures/{}.png (.pdf)",
     "light_change": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "benchmark": "tables/{}.md (.csv)",
@@ -28,6 +29,7 @@ FILES = {
 MAIN_FILE = {
     "table": "tables/{}.csv",
     "density": "figures/{}.png",
+    "direct_map": "tables/{}.csv",
     "disparity_figure": "figures/{}.png",
     "light_change": "tables/{}.csv",
     "benchmark": "tables/{}.csv",
@@ -129,6 +131,21 @@ def _mrpt_map_lines(path: Path) -> list[str]:
     ]
 
 
+def _direct_map_lines(path: Path) -> list[str]:
+    """Per sequence and column the error of the path, and where the surface is known that of the points."""
+    lines = []
+    for sequence, rows in pd.read_csv(path).groupby("sequence", sort=False):
+        known = rows["median_m"].notna().any()
+        texts = [
+            f"{row.column} {1000 * row.ate_rmse_m:.1f} mm"
+            + (f", {100 * row.median_m:.1f} cm, {100 * row.spread_m:.1f} cm" if known else "")
+            for row in rows.itertuples()
+        ]
+        what = ", ATE RMSE" + (", median off the surface, spread of walls" if known else "")
+        lines.append(f"{sequence}{what}: {'; '.join(texts)}")
+    return lines
+
+
 def _light_change_lines(path: Path) -> list[str]:
     """Per data set, region, case and matcher the columns by the rise of their mean error."""
     frame = pd.read_csv(path, dtype={"case": str}).dropna(subset="mean_px_rise")
@@ -180,6 +197,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _semi_dense_lines(main_file(stage, results), stage.drawn)
     if stage.kind == "convergence":
         return _convergence_lines(main_file(stage, results), stage.table_start["px"])
+    if stage.kind == "direct_map":
+        return _direct_map_lines(main_file(stage, results))
     if stage.kind == "mrpt_map":
         return _mrpt_map_lines(main_file(stage, results))
     if stage.kind == "odometry":

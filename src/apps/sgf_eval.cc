@@ -63,6 +63,16 @@ struct TrajectoryCommand {
     app.add_option("--common", request.common,
                    "TUM files of other estimates: compare only poses at times that all have");
     app.add_option("--out", request.output, "file to write: *.json, or else CSV");
+    app.add_option("--aligned", request.aligned,
+                   "TUM file to write: poses of the body in the world of the ground truth");
+    CLI::Option& points =
+        *app.add_option("--points", request.points,
+                        "PLY file as sgf_direct writes it, to be moved as the estimate");
+    CLI::Option& aligned_points =
+        *app.add_option("--aligned-points", request.aligned_points,
+                        "PLY file to write: these points in the world of the ground truth");
+    points.needs(&aligned_points);
+    aligned_points.needs(&points);
   }
 
   void Run() {

@@ -1,5 +1,5 @@
 // Renders the synthetic world: scenes as EXR images with all layers, stereo pairs, stereo-inertial
-// sequences, and camera images of layers rendered before.
+// sequences, and camera images of layers rendered before; finds how far points lie off a scene.
 
 #include <charconv>
 #include <cmath>
@@ -16,9 +16,11 @@
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/image.h>
 #include <sgf/io/manifest.h>
+#include <sgf/io/ply.h>
 #include <sgf/synth/frame_exr.h>
 #include <sgf/synth/sequence.h>
 #include <sgf/synth/stereo_pair.h>
+#include <sgf/synth/surface_finder.h>
 
 namespace sgf::apps {
 namespace {
@@ -324,6 +326,34 @@ void ApplyPhotometry(const PhotometryRequest& r) {
   WritePng(r.out, camera.Expose(luminance, r.exposure_ms, r.seed));
 }
 
+struct OffsetsRequest {
+  std::string scene;
+  std::filesystem::path points, out;
+};
+
+void AddOffsets(CLI::App& app, OffsetsRequest& r) {
+  app.add_option("--scene", r.scene, "name of the scene (see scenes)")->required();
+  app.add_option("--points", r.points, "PLY file as sgf_direct writes it, in the scene's world, m")
+      ->required();
+  app.add_option("--out", r.out,
+                 "CSV file to write, a line per point: offset_m (negative behind a surface), the "
+                 "nearest place x, y, z (m) and the id of its object (0: a lamp)")
+      ->required();
+}
+
+void WriteOffsets(const OffsetsRequest& r) {
+  const std::vector<PlyPoint> points = ReadPointsPly(r.points);
+  const synth::SurfaceFinder finder(synth::BuildScene(r.scene));
+  std::string lines = "offset_m,x,y,z,object\n";
+  for (const PlyPoint& point : points) {
+    const cv::Point3d p = point.position;
+    const synth::NearestSurface near = finder.Nearest({p.x, p.y, p.z});
+    lines += fmt::format("{:.6f},{:.4f},{:.4f},{:.4f},{}\n", near.offset_m, near.place.x(),
+                         near.place.y(), near.place.z(), near.object);
+  }
+  WriteTextFile(r.out, lines);
+}
+
 void CheckFolders(const std::vector<std::string>& folders) {
   for (const std::string& folder : folders) {
     CheckManifest(folder);
@@ -352,6 +382,7 @@ int main(int argc, char** argv) {
   apps::PairsRequest pairs;
   apps::SequencesRequest sequences;
   apps::PhotometryRequest photometry;
+  apps::OffsetsRequest off;
   bool list_views = false;
   CLI::App* list = app.add_subcommand("scenes", "list the scenes");
   list->add_flag("--views", list_views, "list `scene view` for every view instead");
@@ -359,6 +390,8 @@ int main(int argc, char** argv) {
   CLI::App* pair = app.add_subcommand("pair", "stereo pairs with ground truth");
   CLI::App* sequence = app.add_subcommand("sequence", "stereo-inertial sequences");
   CLI::App* apply = app.add_subcommand("photometry", "a camera's image of layers rendered before");
+  CLI::App* offsets =
+      app.add_subcommand("offsets", "how far points lie off the surfaces of a scene");
   std::vector<std::string> checked;
   CLI::App* check = app.add_subcommand("check", "compare rendered folders with their manifests");
   check->add_option("folders", checked, "of pairs or sequences")->required();
@@ -366,6 +399,7 @@ int main(int argc, char** argv) {
   apps::AddPairs(*pair, pairs);
   apps::AddSequences(*sequence, sequences);
   apps::AddPhotometry(*apply, photometry);
+  apps::AddOffsets(*offsets, off);
 
   return apps::RunTool(app, argc, argv, [&] {
     if (*list) apps::ListScenes(list_views);
@@ -373,6 +407,7 @@ int main(int argc, char** argv) {
     if (*pair) apps::RenderPairs(pairs);
     if (*sequence) apps::RenderSequences(sequences);
     if (*apply) apps::ApplyPhotometry(photometry);
+    if (*offsets) apps::WriteOffsets(off);
     if (*check) apps::CheckFolders(checked);
   });
 }

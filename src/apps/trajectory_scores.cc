@@ -10,6 +10,7 @@
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/fields.h>
 #include <sgf/io/odometry_dataset.h>
+#include <sgf/io/ply.h>
 #include <sgf/io/trajectory.h>
 
 namespace sgf::apps {
@@ -39,17 +40,25 @@ Reference FileReference(const std::string& file) {
   return reference;
 }
 
-TrajectoryScores Score(const std::vector<TimedPose>& estimate, const Reference& reference,
+// The poses that are compared.
+std::vector<TimedPose> Compared(const std::vector<TimedPose>& estimate,
+                                const TrajectoryScoreRequest& request) {
+  std::vector<TimedPose> common = estimate;
+  for (const std::string& file : request.common)
+    common = KeepCommonTimes(common, ReadTrajectory(file));
+  return common;
+}
+
+// @param compared those of the estimate's poses that are compared.
+TrajectoryScores Score(const std::vector<TimedPose>& estimate,
+                       const std::vector<TimedPose>& compared, const Reference& reference,
                        const TrajectoryScoreRequest& request) {
   const auto score = [&](const std::vector<TimedPose>& poses) {
     return ScoreTrajectory(poses, reference.truth, reference.T_body_est, reference.frame_times_ns,
                            request.options.trajectory);
   };
-  if (request.common.empty()) return score(estimate);
-  std::vector<TimedPose> common = estimate;
-  for (const std::string& file : request.common)
-    common = KeepCommonTimes(common, ReadTrajectory(file));
-  TrajectoryScores scores = score(common);
+  TrajectoryScores scores = score(compared);
+  if (request.common.empty()) return scores;
   scores.coverage_pct = score(estimate).coverage_pct;
   return scores;
 }
@@ -109,6 +118,31 @@ std::string ToJson(const Record& record) {
   return json.dump(2) + "\n";
 }
 
+// Writes poses and points in the world of the truth, as far as they are asked for.
+void WriteAligned(const std::vector<TimedPose>& estimate, const std::vector<TimedPose>& compared,
+                  const Reference& reference, const TrajectoryScoreRequest& request) {
+  const auto motion =
+      AlignTrajectory(compared, reference.truth, reference.T_body_est, request.options.trajectory);
+  if (!request.aligned.empty()) {
+    const SE3 T_est_body = reference.T_body_est.Inverse();
+    std::vector<TimedPose> body;
+    if (motion)
+      for (const auto& [time_ns, pose] : estimate)
+        body.push_back({time_ns, *motion * pose * T_est_body});
+    WriteTrajectory(request.aligned, body);
+  }
+  if (request.points.empty()) return;
+  std::vector<PlyPoint> points = ReadPointsPly(request.points);
+  if (!motion) points.clear();
+  for (PlyPoint& point : points) {
+    const cv::Point3d p = point.position;
+    const Eigen::Vector3d moved = *motion * Eigen::Vector3d(p.x, p.y, p.z);
+    point.position = cv::Point3d(moved.x(), moved.y(), moved.z());
+  }
+  WritePointsPly(request.aligned_points, points,
+                 "world of the ground truth, m; variance as it was");
+}
+
 }  // namespace
 
 std::span<const std::pair<const char*, PoseFrame>> EnumNames(PoseFrame) {
@@ -121,9 +155,11 @@ void ScoreTrajectoryFile(const TrajectoryScoreRequest& request) {
   const Reference reference = request.sequence.empty()
                                   ? FileReference(request.truth)
                                   : SequenceReference(request.sequence, request.options.frame);
-  const Scores scores =
-      DescribeOptions(Score(ReadTrajectory(request.estimate), reference, request));
+  const std::vector<TimedPose> estimate = ReadTrajectory(request.estimate);
+  const std::vector<TimedPose> compared = Compared(estimate, request);
+  const Scores scores = DescribeOptions(Score(estimate, compared, reference, request));
   PrintTable(scores);
+  WriteAligned(estimate, compared, reference, request);
   if (request.output.empty()) return;
   const Record record = MakeRecord(request, scores);
   WriteTextFile(request.output, request.output.ends_with(".json") ? ToJson(record) : ToCsv(record));

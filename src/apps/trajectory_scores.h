@@ -37,11 +37,15 @@ struct TrajectoryScoreRequest {
   /// TUM files of other estimates: only poses at times that all of them have are compared. Coverage
   /// stays that of the estimate itself.
   std::vector<std::string> common;
-  std::string output;  ///< file to write: *.json, or else CSV; empty for none
+  std::string output;          ///< file to write: *.json, or else CSV; empty for none
+  std::string aligned;         ///< TUM file to write: the body in the truth's world; empty for none
+  std::string points;          ///< PLY file with points of the estimate's world, or empty
+  std::string aligned_points;  ///< PLY file to write: these points in the truth's world
   TrajectoryScoreOptions options;
 };
 
-/// Scores a trajectory: a table to stdout, and the file that is asked for.
+/// Scores a trajectory: a table to stdout, and the files that are asked for. Of an estimate that
+/// cannot be compared nothing is aligned: the files of aligned poses and points hold none.
 /// @throws Error for files that cannot be read or written and a sequence without ground truth.
 void ScoreTrajectoryFile(const TrajectoryScoreRequest& request);
 

@@ -67,20 +67,21 @@ double FindScale(PosePairs pairs, const SE3& T_body_est) {
   return std::isfinite(scale) ? scale : 1;
 }
 
-// Estimated poses of the body in the world of the truth; returns the scale.
-double Align(const SE3& T_body_est, TrajectoryAlignment align, PosePairs& pairs) {
-  const double scale = align == TrajectoryAlignment::kSim3 ? FindScale(pairs, T_body_est) : 1;
+// Makes estimated poses those of the body, in the world of the truth; returns what moved them.
+TrajectoryMotion Align(const SE3& T_body_est, TrajectoryAlignment align, PosePairs& pairs) {
+  TrajectoryMotion found;
+  if (align == TrajectoryAlignment::kSim3) found.scale = FindScale(pairs, T_body_est);
   const SE3 T_est_body = T_body_est.Inverse();
   for (PosePair& pair : pairs) {
-    pair.estimate.p *= scale;
+    pair.estimate.p *= found.scale;
     pair.estimate = pair.estimate * T_est_body;
   }
-  if (align == TrajectoryAlignment::kNone) return scale;
+  if (align == TrajectoryAlignment::kNone) return found;
   const Eigen::Matrix4d m = Umeyama(pairs, false);
-  const SE3 motion{Eigen::Quaterniond(m.topLeftCorner<3, 3>()).normalized(),
-                   m.topRightCorner<3, 1>()};
-  for (PosePair& pair : pairs) pair.estimate = motion * pair.estimate;
-  return scale;
+  found.motion = {Eigen::Quaterniond(m.topLeftCorner<3, 3>()).normalized(),
+                  m.topRightCorner<3, 1>()};
+  for (PosePair& pair : pairs) pair.estimate = found.motion * pair.estimate;
+  return found;
 }
 
 // ---- Errors
@@ -231,6 +232,15 @@ std::vector<TimedPose> KeepCommonTimes(std::span<const TimedPose> trajectory,
   return common;
 }
 
+std::optional<TrajectoryMotion> AlignTrajectory(std::span<const TimedPose> estimate,
+                                                std::span<const TimedPose> truth,
+                                                const SE3& T_body_est,
+                                                const TrajectoryOptions& options) {
+  PosePairs pairs = Associate(estimate, truth, options.max_truth_gap_s);
+  if (pairs.size() < kMinPoses) return std::nullopt;
+  return Align(T_body_est, options.align, pairs);
+}
+
 TrajectoryScores ScoreTrajectory(std::span<const TimedPose> estimate,
                                  std::span<const TimedPose> truth, const SE3& T_body_est,
                                  std::span<const std::int64_t> frame_times_ns,
@@ -240,7 +250,7 @@ TrajectoryScores ScoreTrajectory(std::span<const TimedPose> estimate,
   ScoreCoverage(estimate, truth, frame_times_ns, options.max_truth_gap_s, scores);
   scores.poses = static_cast<int>(pairs.size());
   if (pairs.size() < kMinPoses) return scores;
-  scores.scale = Align(T_body_est, options.align, pairs);
+  scores.scale = Align(T_body_est, options.align, pairs).scale;
   const std::vector<double> path = PathLengths(pairs);
   scores.path_m = path.back();
   ScorePositions(pairs, scores);

@@ -104,10 +104,29 @@ struct TrajectoryScores {
 std::optional<SE3> InterpolatePose(std::span<const TimedPose> trajectory, std::int64_t time_ns,
                                    double max_gap_s);
 
+/// What brings an estimate to ground truth: a place x of the estimate's world is at
+/// motion * (scale * x) of the truth's.
+struct TrajectoryMotion {
+  double scale = 1;
+  SE3 motion;  ///< from the scaled world of the estimate to that of the truth
+
+  Eigen::Vector3d operator*(const Eigen::Vector3d& x) const { return motion * (scale * x); }
+
+  /// The pose in the truth's world; its frame stays what it is.
+  SE3 operator*(const SE3& pose) const { return motion * SE3{pose.R, scale * pose.p}; }
+};
+
 /// The poses of a trajectory at whose times (to 1 us) another one has a pose too. Errors of two
 /// estimates are compared over the same poses only.
 std::vector<TimedPose> KeepCommonTimes(std::span<const TimedPose> trajectory,
                                        std::span<const TimedPose> other);
+
+/// What ScoreTrajectory() moves an estimate by, for all that was estimated with it, such as a map.
+/// Arguments as there. None where fewer than three poses can be compared.
+std::optional<TrajectoryMotion> AlignTrajectory(std::span<const TimedPose> estimate,
+                                                std::span<const TimedPose> truth,
+                                                const SE3& T_body_est,
+                                                const TrajectoryOptions& options);
 
 /// Scores an estimated trajectory; all errors are those of the body.
 ///

@@ -2,28 +2,58 @@
 #include <bit>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include <fmt/core.h>
 
+#include <sgf/core/error.h>
 #include <sgf/io/atomic_file.h>
+#include <sgf/io/fields.h>
 #include <sgf/io/ply.h>
+#include <sgf/io/read_file.h>
 
 namespace sgf {
 namespace {
 
+constexpr std::string_view kFormat = "ply\nformat binary_little_endian 1.0\n";
+constexpr std::string_view kPoint =
+    "property float x\nproperty float y\nproperty float z\nproperty float variance\n"
+    "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int support\n"
+    "end_header\n";
+constexpr size_t kPointBytes = 4 * 4 + 3 + 4;
+
 void AppendLittleEndian(std::string& bytes, uint32_t word) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 0xFF);
 }
+
+/// Takes the text up to and with `mark` off the front of `text`. @throws Error where it has none.
+std::string_view TakeUntil(std::string_view mark, std::string_view& text,
+                           const std::filesystem::path& path) {
+  const size_t end = text.find(mark);
+  if (end == std::string_view::npos)
+    throw Error(path.string(), fmt::format("has no {} in its header", Printable(mark)));
+  const std::string_view front = text.substr(0, end);
+  text.remove_prefix(end + mark.size());
+  return front;
+}
+
+uint32_t TakeLittleEndian(std::string_view& bytes) {
+  uint32_t word = 0;
+  for (int k = 0; k < 4; ++k) word |= uint32_t{static_cast<uint8_t>(bytes[k])} << 8 * k;
+  bytes.remove_prefix(4);
+  return word;
+}
+
+float TakeFloat(std::string_view& bytes) { return std::bit_cast<float>(TakeLittleEndian(bytes)); }
 
 }  // namespace
 
 void WriteMeshPly(const std::filesystem::path& path, std::span<const cv::Point3f> vertices,
                   std::span<const std::array<int, 3>> triangles, const std::string& comment) {
   std::string bytes = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment {}\nelement vertex {}\n"
-      "property float x\nproperty float y\nproperty float z\n"
+      "{}comment {}\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
       "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-      comment, vertices.size(), triangles.size());
+      kFormat, comment, vertices.size(), triangles.size());
   for (const cv::Point3f& v : vertices)
     for (const float coordinate : {v.x, v.y, v.z})
       AppendLittleEndian(bytes, std::bit_cast<uint32_t>(coordinate));
@@ -36,12 +66,8 @@ void WriteMeshPly(const std::filesystem::path& path, std::span<const cv::Point3f
 
 void WritePointsPly(const std::filesystem::path& path, std::span<const PlyPoint> points,
                     const std::string& comment) {
-  std::string bytes = fmt::format(
-      "ply\nformat binary_little_endian 1.0\ncomment {}\nelement vertex {}\n"
-      "property float x\nproperty float y\nproperty float z\nproperty float variance\n"
-      "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int support\n"
-      "end_header\n",
-      comment, points.size());
+  std::string bytes =
+      fmt::format("{}comment {}\nelement vertex {}\n{}", kFormat, comment, points.size(), kPoint);
   for (const PlyPoint& p : points) {
     for (const float value : {p.position.x, p.position.y, p.position.z, p.variance})
       AppendLittleEndian(bytes, std::bit_cast<uint32_t>(value));
@@ -50,6 +76,27 @@ void WritePointsPly(const std::filesystem::path& path, std::span<const PlyPoint>
     AppendLittleEndian(bytes, static_cast<uint32_t>(p.support));
   }
   WriteTextFile(path, bytes);
+}
+
+std::vector<PlyPoint> ReadPointsPly(const std::filesystem::path& path) {
+  const std::string data = ReadFile(path);
+  std::string_view rest = data;
+  const std::string_view begin = TakeUntil("element vertex ", rest, path);
+  const auto count = ParseNumber<int>(TakeUntil("\n", rest, path));
+  if (!begin.starts_with(kFormat) || !rest.starts_with(kPoint) || !count || *count < 0)
+    throw Error(path.string(), "is no binary PLY file with x, y, z, variance, colour and support");
+  rest.remove_prefix(kPoint.size());
+  if (rest.size() != kPointBytes * static_cast<size_t>(*count))
+    throw Error(path.string(), fmt::format("{} bytes do not hold {} points", rest.size(), *count));
+  std::vector<PlyPoint> points(*count);
+  for (PlyPoint& p : points) {
+    p.position = {TakeFloat(rest), TakeFloat(rest), TakeFloat(rest)};
+    p.variance = TakeFloat(rest);
+    p.grey = static_cast<uint8_t>(rest.front());
+    rest.remove_prefix(3);
+    p.support = static_cast<int>(TakeLittleEndian(rest));
+  }
+  return points;
 }
 
 }  // namespace sgf

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -30,5 +31,9 @@ struct PlyPoint {
 /// @throws Error for a file that cannot be written.
 void WritePointsPly(const std::filesystem::path& path, std::span<const PlyPoint> points,
                     const std::string& comment);
+
+/// Reads points as WritePointsPly() writes them; the comment may be any.
+/// @throws Error naming the file for another header or another number of bytes; as ReadFile().
+std::vector<PlyPoint> ReadPointsPly(const std::filesystem::path& path);
 
 }  // namespace sgf

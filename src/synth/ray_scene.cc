@@ -57,6 +57,56 @@ RTCRayHit Query(const Ray& ray) {
   return query;
 }
 
+/// Place of a triangle nearest to the origin (Ericson, "Real-Time Collision Detection", 5.1.5): at
+/// a corner, on an edge, or inside.
+Eigen::Vector3f NearestOfTriangle(const Eigen::Vector3f& a, const Eigen::Vector3f& b,
+                                  const Eigen::Vector3f& c) {
+  const Eigen::Vector3f ab = b - a, ac = c - a, bc = c - b;
+  const float a1 = -ab.dot(a), a2 = -ac.dot(a);
+  if (a1 <= 0 && a2 <= 0) return a;
+  const float b1 = -ab.dot(b), b2 = -ac.dot(b);
+  if (b1 >= 0 && b2 <= b1) return b;
+  const float c1 = -ab.dot(c), c2 = -ac.dot(c);
+  if (c2 >= 0 && c1 <= c2) return c;
+  const float wc = a1 * b2 - b1 * a2;
+  if (wc <= 0 && a1 >= 0 && b1 <= 0) return a + a1 / (a1 - b1) * ab;
+  const float wb = c1 * a2 - a1 * c2;
+  if (wb <= 0 && a2 >= 0 && c2 <= 0) return a + a2 / (a2 - c2) * ac;
+  const float wa = b1 * c2 - c1 * b2;
+  if (wa <= 0 && b2 >= b1 && c1 >= c2) return b + (b2 - b1) / (b2 - b1 + c1 - c2) * bc;
+  return a + (wb * ab + wc * ac) / (wa + wb + wc);
+}
+
+/// What Embree's search for the nearest place carries along.
+struct NearestSearch {
+  RTCScene scene;
+  Eigen::Vector3f point;
+  NearPlace found;
+};
+
+/// Takes a quad that may be nearer than what was found so far, and if so shrinks the search to it.
+bool VisitQuad(RTCPointQueryFunctionArguments* visit) {
+  auto& search = *static_cast<NearestSearch*>(visit->userPtr);
+  const RTCGeometry geometry = rtcGetGeometry(search.scene, visit->geomID);
+  const auto* points = static_cast<const Eigen::Vector3f*>(
+      rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_VERTEX, 0));
+  const unsigned* quad =
+      static_cast<const unsigned*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_INDEX, 0)) +
+      4 * size_t{visit->primID};
+  bool nearer = false;
+  for (const auto& [i, j, k] : {std::array{0, 1, 3}, std::array{2, 3, 1}}) {
+    const Eigen::Vector3f a = points[quad[i]] - search.point, b = points[quad[j]] - search.point,
+                          c = points[quad[k]] - search.point;
+    const Eigen::Vector3f nearest = NearestOfTriangle(a, b, c);
+    const float distance = nearest.norm();  // no number where the triangle has no area
+    if (!(distance < visit->query->radius)) continue;
+    visit->query->radius = distance;
+    search.found = {static_cast<int>(visit->geomID), search.point + nearest, (b - a).cross(c - a)};
+    nearer = true;
+  }
+  return nearer;
+}
+
 RTCIntersectContext Context(RTCIntersectContextFlags flags) {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -151,6 +201,16 @@ Hit RayScene::Answer(const RTCRayHit& query) const {
   hit.plane_normal = {query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z};
   SetCoordinates(surfaces_[hit.surface], query.hit.u, query.hit.v, hit);
   return hit;
+}
+
+NearPlace RayScene::Nearest(const Eigen::Vector3f& point) const {
+  RTCPointQuery query{
+      .x = point.x(), .y = point.y(), .z = point.z(), .time = 0, .radius = kInfinity};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  NearestSearch search{embree_->scene, point, {}};
+  rtcPointQuery(embree_->scene, &query, &context, VisitQuad, &search);
+  return search.found;
 }
 
 bool RayScene::Blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const {

@@ -38,6 +38,13 @@ struct Ray {
   Eigen::Vector3f direction;  ///< of any length
 };
 
+/// Where geometry comes nearest to a point.
+struct NearPlace {
+  int surface = -1;              ///< index in RayScene::surfaces(); -1: none
+  Eigen::Vector3f place;         ///< m
+  Eigen::Vector3f plane_normal;  ///< of the flat piece, as those of its patch, of any length
+};
+
 /// Embree's scene. Always on the SSE4.2 code path, with robust intersection: other instruction sets
 /// give other depths in the last bits. Built by one thread, so that the tree is always the same.
 class RayScene {
@@ -54,6 +61,9 @@ class RayScene {
 
   /// First hit of a ray that is alone.
   Hit Intersect(const Ray& ray) const;
+
+  /// The place of all geometry that is nearest to a point; none for a point that is not finite.
+  NearPlace Nearest(const Eigen::Vector3f& point) const;
 
   /// Whether anything lies between two points, the ends left out.
   bool Blocked(const Eigen::Vector3f& from, const Eigen::Vector3f& to) const;

@@ -15,7 +15,7 @@ EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").g
 ODOMETRY = ["odometry", "odometry_parts"]
 TRACKED = [*ODOMETRY, "table3"]
 # These need no data set.
-RENDERED = ["convergence", "fig1", "fig2", "fig3", "mrpt_map", *TRACKED, "scenes", "sequences"]
+RENDERED = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "scenes", "sequences"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -26,7 +26,7 @@ FILES = {
     ]
     + ["density.csv", "density_equal.csv", "density.md", "bench_stereo.csv", "bench_stereo.md"]
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
-    + ["convergence.csv", "convergence.md", "mrpt_map.csv", "mrpt_map.md"]
+    + ["convergence.csv", "convergence.md", "fig6.csv", "fig6.md", "mrpt_map.csv", "mrpt_map.md"]
     + [f"{name}{end}" for name in TRACKED for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
     + ["table3.tex"]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
@@ -69,6 +69,7 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
     assert "checked, kept, median / 90th percentile of depth errors: sad 60 %, 1.0 / 20.0 cm" in summary
     assert "V1_02_medium: 10 of 10 frames with pose, 2 key-frames, 3 points, ATE RMSE 1.0 mm" in summary
+    assert "spread of walls: photo 1.0 mm, 1.0 cm, 0.0 cm; sgf 1.0 mm, 1.0 cm, 0.0 cm" in summary
     assert "sequences      made        figures/sequences.png (.pdf), tables/sequences.md" in summary
     assert "Data sets absent: middlebury2014_h (https://" in summary
 
@@ -263,7 +264,7 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
     "command, log, lost",
     [
         ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
-        ("sequence", "sequences_run.log", ["mrpt_map", *TRACKED, "sequences"]),
+        ("sequence", "sequences_run.log", ["fig6", "mrpt_map", *TRACKED, "sequences"]),
     ],
 )
 def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):
@@ -311,6 +312,20 @@ def test_a_downloaded_sequence_joins_the_rendered_one(project):
     assert [row["sequence"] for row in table] == ["V1_02_medium", "euroc_MH_01"]
     assert (raw / "V1_02_medium" / "map.tum").stat().st_mtime_ns == before
     assert not list((raw / "euroc_MH_01").glob("in*")), "the rawlog holds a copy of every image"
+
+
+def test_the_surface_of_a_downloaded_sequence_is_not_known(project):
+    rendered = project.root / "datasets" / "generated" / "sequences" / "MH_01_easy"
+    assert project.run("--only", "fig6")[0] == 0
+    shutil.copytree(rendered, project.data / "euroc" / "MH_01_easy")
+    (project.data / "euroc" / "MH_01_easy" / "mav0" / "cam0" / "data.csv").touch()
+    code, output = project.run("--only", "fig6", "--data", str(project.data))
+    assert code == 0, output
+    table = rows(project.results / "tables" / "fig6.csv")
+    known = ["V1_02_medium", "MH_03_medium"]
+    assert [row["sequence"] for row in table] == [name for name in [*known, "euroc_MH_01"] for _ in range(2)]
+    assert {row["sequence"] for row in table if row["median_m"]} == set(known)
+    assert not list((project.results / "raw" / "fig6" / "euroc_MH_01").glob("*_offsets.csv"))
 
 
 def test_downloaded_frames_join_the_generated_ones(project):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from test_tools import BUILD, fails, read_pfm, run
+from test_tools import BUILD, fails, read_pfm, run, write_points
 
 SMALL = ("--width", 94, "--height", 60, "--focal-px", 58)
 
@@ -89,6 +89,23 @@ def test_photometry_refuses_bad_input(layers, tmp_path):
     assert fails(render("photometry", "--in", broken, "--out", out), "broken.exr")
     assert fails(render("photometry", "--in", tmp_path / "none.exr", "--out", out), "none.exr")
     assert not out.exists()
+
+
+def test_offsets_tell_how_far_points_lie_off_a_scene(tmp_path):
+    # over the floor, and beyond the wall at x = 4
+    points = write_points(tmp_path / "points.ply", [(0, 0, 0.5, 0, 0, 3), (4.25, 0, 3.2, 0, 0, 3)])
+    out = tmp_path / "offsets.csv"
+    command = ("offsets", "--points", points, "--out", out)
+    done = render(*command, "--scene", "mocap_room_1")
+    assert done.returncode == 0, done.stderr
+    header, *lines = out.read_text().splitlines()
+    assert header == "offset_m,x,y,z,object"
+    floor, wall = (tuple(map(float, line.split(","))) for line in lines)
+    assert floor[0] == pytest.approx(0.5, abs=0.05) and floor[3] == pytest.approx(0, abs=0.05)
+    assert wall[:2] == pytest.approx((-0.25, 4), abs=1e-3)
+    assert fails(render(*command, "--scene", "moon"), "moon", "mocap_room_1")
+    points.write_text("ply\n")
+    assert fails(render(*command, "--scene", "mocap_room_1"), "points.ply")
 
 
 def test_pair_is_a_middlebury_scene(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import struct
 import subprocess
 from pathlib import Path
 
@@ -32,6 +33,23 @@ def read_pfm(path):
     assert kind == b"Pf" and float(scale) < 0
     columns, rows = map(int, size.split())
     return np.flipud(np.frombuffer(data, "<f4").reshape(rows, columns))
+
+
+def read_points(path):
+    """Points as rows x, y, z, variance, grey and support."""
+    header, _, body = path.read_bytes().partition(b"end_header\n")
+    assert f"element vertex {len(body) // 23}\n".encode() in header
+    return [(*p[:5], p[7]) for p in struct.iter_unpack("<4f3Bi", body)]
+
+
+def write_points(path, points):
+    kinds = ["float x", "float y", "float z", "float variance"]
+    kinds += ["uchar red", "uchar green", "uchar blue", "int support"]
+    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(points)}"]
+    lines += [*(f"property {kind}" for kind in kinds), "end_header", ""]
+    body = b"".join(struct.pack("<4f3Bi", *p[:4], p[4], p[4], p[4], p[5]) for p in points)
+    path.write_bytes("\n".join(lines).encode() + body)
+    return path
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from test_tools import fails, run
+from test_tools import fails, read_points, run, write_points
 
 POSES = 60
 
@@ -110,6 +110,25 @@ def test_an_estimate_without_poses_has_no_errors_and_no_success(kitti, tmp_path)
     scores = scores_of(result, out)
     assert scores["coverage_pct"] == 0 and scores["ate_rmse_m"] is None
     assert scores["success_by_ate"] is False
+
+
+def test_the_estimate_and_its_points_are_moved_to_the_ground_truth(truth, walk, tmp_path):
+    estimate = write_tum(tmp_path / "estimate.txt", 2 * walk + [5, 0, 0])
+    points = write_points(tmp_path / "points.ply", [(7, 2, 4, 0.5, 99, 3), (5, 0, 0, 0.25, 1, 2)])
+    score = ["sgf_eval", "trajectory", estimate, "--truth", truth, "--align", "sim3"]
+    poses, moved = tmp_path / "aligned.txt", tmp_path / "moved.ply"
+    result = run(*score, "--aligned", poses, "--points", points, "--aligned-points", moved)
+    assert result.returncode == 0, result.stderr
+    assert np.allclose(np.loadtxt(poses)[:, 1:4], walk, atol=1e-9)
+    expected = [(1, 1, 2, 0.5, 99, 3), (0, 0, 0, 0.25, 1, 2)]
+    assert np.allclose(read_points(moved), expected, atol=1e-6)
+    write_tum(estimate, walk[:2])
+    assert run(*score, "--aligned", poses, "--points", points, "--aligned-points", moved).returncode == 0
+    assert read_points(moved) == []
+    assert all(line.startswith("#") for line in poses.read_text().splitlines())
+    points.write_text("ply\n")
+    assert fails(run(*score, "--points", points, "--aligned-points", moved), "points.ply", "header")
+    assert run(*score, "--points", points).returncode == 2
 
 
 def test_bad_input_is_named(kitti, truth, tmp_path):

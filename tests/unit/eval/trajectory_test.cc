@@ -79,6 +79,27 @@ RC_GTEST_PROP(TrajectoryProperty, RecoversTheScaleBeforeTheLeverArm, ()) {
   RC_ASSERT(scores.orientation_rmse_deg < 1e-5);
 }
 
+// What moves the poses moves a map that was estimated with them.
+RC_GTEST_PROP(TrajectoryProperty, GivesTheMotionThatItAlignsWith, ()) {
+  const Poses truth = Walk(60);
+  const SE3 T_body_est = RandomMotion(), T_other_world = RandomMotion();
+  const double scale = *rc::gen::inRange(100, 5000) / 1000.0;
+  const Poses estimate = Moved(truth, T_other_world, T_body_est, scale);
+  const auto found =
+      AlignTrajectory(estimate, truth, T_body_est, {TrajectoryAlignment::kSim3, 0.06});
+  RC_ASSERT(found.has_value());
+  const Eigen::Vector3d place(3, -2, 5);
+  RC_ASSERT((*found * (scale * (T_other_world * place)) - place).norm() < 1e-7);
+  const SE3 body = *found * estimate[7].pose * T_body_est.Inverse();
+  RC_ASSERT((body.p - truth[7].pose.p).norm() < 1e-7);
+  RC_ASSERT(body.R.angularDistance(truth[7].pose.R) < 1e-6);
+}
+
+TEST(Trajectory, OfTwoPosesCannotBeAligned) {
+  const Poses truth = Walk(2);
+  EXPECT_FALSE(AlignTrajectory(truth, truth, {}, {}).has_value());
+}
+
 // No other motion of the estimate comes closer in the mean of squares.
 RC_GTEST_PROP(TrajectoryProperty, AlignsBestInTheLeastSquaresSense, ()) {
   const Poses truth = Walk(30);

@@ -1,52 +1,52 @@
-#include <array>
-#include <cstring>
 #include <string>
-#include <vector>
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <support/error_message.h>
+#include <support/temp_dir.h>
 
 #include <sgf/io/ply.h>
-#include <sgf/io/read_file.h>
-
-#include "support/error_message.h"
-#include "support/temp_dir.h"
 
 namespace sgf {
 namespace {
 
-using ::testing::HasSubstr;
-
-TEST(Ply, PointsHaveColourVarianceAndSupport) {
-  const TempDir dir;
-  const std::vector<PlyPoint> points = {{{1, 2, 3}, 300, 0.25F, 4}, {{-1, 0, 5}, 7.4F, 0.5F, 2}};
-  WritePointsPly(dir.File("points.ply"), points, "of a test");
-  const std::string text = ReadFile(dir.File("points.ply"));
-  EXPECT_THAT(text, HasSubstr("element vertex 2\n"));
-  EXPECT_THAT(text, HasSubstr("comment of a test\n"));
-  const std::string end = "end_header\n";
-  const size_t begin = text.find(end) + end.size();
-  constexpr size_t kSize = 4 * sizeof(float) + 3 + sizeof(int);
-  ASSERT_EQ(text.size(), begin + 2 * kSize);
-  const auto read = [&](size_t point, size_t offset, auto& value) {
-    std::memcpy(&value, text.data() + begin + point * kSize + offset, sizeof(value));
-  };
-  std::array<float, 4> numbers;
-  std::array<unsigned char, 3> colour;
-  int support;
-  read(1, 0, numbers);
-  EXPECT_THAT(numbers, testing::ElementsAre(-1, 0, 5, 0.5F));
-  read(1, 16, colour);
-  EXPECT_THAT(colour, testing::Each(7));
-  read(0, 16, colour);
-  EXPECT_THAT(colour, testing::Each(255)) << "cut";
-  read(0, 19, support);
-  EXPECT_EQ(support, 4);
+std::string Text(const std::string& count) {
+  return "ply\nformat binary_little_endian 1.0\ncomment any\nelement vertex " + count +
+         "\nproperty float x\nproperty float y\nproperty float z\nproperty float variance\n"
+         "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int support\n"
+         "end_header\n";
 }
 
-TEST(Ply, ReportsAFileThatCannotBeWritten) {
-  EXPECT_THAT(ErrorMessage([] { WritePointsPly("/nonexistent/p.ply", {}, ""); }),
-              HasSubstr("/nonexistent"));
+TEST(PointsPly, GivesBackWhatWasWritten) {
+  const TempDir dir;
+  const auto file = dir.path() / "points.ply";
+  const std::vector<PlyPoint> points = {{{1, -2, 3.5f}, 17, 0.25f, 4},
+                                        {{1e-3f, 1e9f, 0}, 255, 0, -1}};
+  WritePointsPly(file, points, "units");
+  const std::vector<PlyPoint> read = ReadPointsPly(file);
+  ASSERT_EQ(read.size(), points.size());
+  for (size_t k = 0; k < points.size(); ++k) {
+    EXPECT_EQ(read[k].position, points[k].position);
+    EXPECT_EQ(read[k].grey, points[k].grey);
+    EXPECT_EQ(read[k].variance, points[k].variance);
+    EXPECT_EQ(read[k].support, points[k].support);
+  }
+  WritePointsPly(file, {}, "units");
+  EXPECT_TRUE(ReadPointsPly(file).empty());
+}
+
+TEST(PointsPly, NamesAFileThatIsAnother) {
+  const TempDir dir;
+  const auto error = [&](const std::string& text) {
+    return ErrorMessage([&] { ReadPointsPly(dir.Write("points.ply", text)); });
+  };
+  EXPECT_TRUE(error("").ends_with("points.ply: has no 'element vertex ' in its header"));
+  EXPECT_TRUE(error(Text("2")).ends_with("points.ply: 0 bytes do not hold 2 points"));
+  EXPECT_TRUE(error(Text("0") + "x").ends_with("points.ply: 1 bytes do not hold 0 points"));
+  std::string no_ply = Text("0"), other_axes = Text("0");
+  no_ply[0] = 'x';
+  other_axes[other_axes.find(" z\n") + 1] = 'w';
+  for (const std::string& text : {Text("-1"), Text("two"), Text("99999999999"), no_ply, other_axes})
+    EXPECT_NE(error(text).find("points.ply: is no binary PLY file"), std::string::npos) << text;
 }
 
 }  // namespace

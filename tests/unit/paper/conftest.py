@@ -1,8 +1,9 @@
-"""Small raw scores whose tables can be worked out by hand."""
+"""Small raw scores whose tables can be worked out by hand, and the ground truth of a flight."""
 
 import itertools
 import json
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -26,6 +27,10 @@ out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
 scores = {name: name.startswith("success") or error for name in names}
 out.write_text(json.dumps({"poses": 99, **scores}))
 """
+TIMES_S = 1.4e9 + 0.05 * np.arange(21)
+# Of the estimate's coordinates in the world: a turn about z by 90 degrees, and a step.
+TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+STEP = np.array([5.0, -2, 1])
 
 
 @pytest.fixture
@@ -167,3 +172,24 @@ def write_scores(tmp_path):
         return tmp_path / "raw"
 
     return write
+
+
+def way(times_s):
+    """A curve in space, over time."""
+    t = times_s - TIMES_S[0]
+    return np.stack([t, t**2, 0.2 * np.sin(5 * t)], axis=1)
+
+
+@pytest.fixture
+def sequence(tmp_path):
+    """Ground truth in EuRoC's layout, at other times than the images'."""
+    folder = tmp_path / "suite" / "V1_02_medium"
+    truth = folder / "mav0" / "state_groundtruth_estimate0"
+    truth.mkdir(parents=True)
+    times_s = TIMES_S[0] + 0.005 * np.arange(-3, 230)
+    places = way(times_s) @ TURN.T + STEP
+    rows = [
+        f"{round(t * 1e9)},{x},{y},{z},1,0,0,0,0,0,0\n" for t, (x, y, z) in zip(times_s, places)
+    ]
+    (truth / "data.csv").write_text("#timestamp, position, rotation, velocity\n" + "".join(rows))
+    return folder

@@ -9,37 +9,13 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, mrpt_map, summary
+from conftest import STEP, TIMES_S, TURN, way
+from sgf_paper import config, map_view, mrpt_map, summary
 from sgf_paper.config import ConfigError
 
 NODE = yaml.safe_load((config.EXPERIMENTS / "mrpt_map.yaml").read_text())
-TIMES_S = 1.4e9 + 0.05 * np.arange(21)
-# Of the estimate's coordinates in the world: a turn about z by 90 degrees, and a step.
-TURN = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-STEP = np.array([5.0, -2, 1])
 POINTS = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, 3]])
 REPORT = "frames: 22, with pose: 21, lost: 1, restarts: 0, key-frames: 4\ngaps over 1 s: 0\n"
-
-
-def way(times_s):
-    """A curve in space, over time."""
-    t = times_s - TIMES_S[0]
-    return np.stack([t, t**2, 0.2 * np.sin(5 * t)], axis=1)
-
-
-@pytest.fixture
-def sequence(tmp_path):
-    """Ground truth in EuRoC's layout, at other times than the images'."""
-    folder = tmp_path / "suite" / "V1_02_medium"
-    truth = folder / "mav0" / "state_groundtruth_estimate0"
-    truth.mkdir(parents=True)
-    times_s = TIMES_S[0] + 0.005 * np.arange(-3, 230)
-    places = way(times_s) @ TURN.T + STEP
-    rows = [
-        f"{round(t * 1e9)},{x},{y},{z},1,0,0,0,0,0,0\n" for t, (x, y, z) in zip(times_s, places)
-    ]
-    (truth / "data.csv").write_text("#timestamp, position, rotation, velocity\n" + "".join(rows))
-    return folder
 
 
 @pytest.fixture
@@ -69,21 +45,21 @@ def test_the_alignment_is_a_rotation_and_a_translation():
 
 def test_map_and_path_are_moved_to_the_ground_truth(raw, sequence):
     run = mrpt_map.read_run(raw, sequence)
-    assert np.abs(run.path - run.truth).max() < 1e-4  # interpolated between poses 5 ms apart
-    assert np.allclose(run.points, POINTS @ TURN.T + STEP, atol=1e-4)
+    assert np.abs(run.map.path - run.map.truth).max() < 1e-4  # interpolated between poses 5 ms apart
+    assert np.allclose(run.map.points, POINTS @ TURN.T + STEP, atol=1e-4)
     assert run.numbers == {
         "frames": 22, "posed": 21, "keyframes": 4, "points": 3, "path_m": 1.5, "ate_rmse_m": 0.0123
     }  # fmt: skip
 
 
 def test_ground_truth_may_be_a_tum_file(sequence):
-    from_csv = mrpt_map.read_truth(sequence, TIMES_S)
+    from_csv = map_view.read_truth(sequence, TIMES_S)
     folder = sequence / "mav0" / "state_groundtruth_estimate0"
     rows = (folder / "data.csv").read_text().splitlines()[1:]
     poses = [f"{int(t) * 1e-9:.9f} {x} {y} {z} 0 0 0 1\n" for t, x, y, z, *_ in (r.split(",") for r in rows)]
     (folder / "data.csv").unlink()
     (folder / "groundtruth_tum.txt").write_text("# time place rotation\n" + "".join(poses))
-    assert np.allclose(mrpt_map.read_truth(sequence, TIMES_S), from_csv, atol=1e-5)
+    assert np.allclose(map_view.read_truth(sequence, TIMES_S), from_csv, atol=1e-5)
 
 
 def test_a_report_without_counts_is_named(raw):
@@ -100,7 +76,7 @@ def test_files_hold_the_table_and_two_panels_a_sequence(raw, sequence, tmp_path)
     assert (tmp_path / "mrpt_map.pdf").stat().st_size > 1000
     experiment = config.load_experiment("mrpt_map")
     drawing = mrpt_map.draw(experiment, {"V1_02_medium": mrpt_map.read_run(raw, sequence)})
-    (row,) = drawing.subfigs
+    row, _ = drawing.subfigs
     above, side, _ = row.axes  # the last is the scale of heights
     assert [axis.get_title() for axis in (above, side)] == ["from above", "from the side"]
     title = row._suptitle.get_text()
