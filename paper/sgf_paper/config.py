@@ -802,8 +802,20 @@ def _build_on_sequences(cls: type, node: dict[str, Any], where: str, of: type = 
     return experiment
 
 
-    ContactSheet, Convergence, Sequences, Table, Density, DirectMap, LightChange, DisparityFigure, Benchmark,
-    MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
+def _build_direct_map(node: dict[str, Any], where: str) -> DirectMap:
+    figure = _build_on_sequences(DirectMap, node, where)
+    figure.points = _build(MapPoints, figure.points, f"{where}: points")
+    figure.surface = _build(OffSurface, figure.surface, f"{where}: surface")
+    limits = figure.surface.doubled_m
+    if len(limits) != 2 or not 0 <= limits[0] < limits[1]:
+        raise ConfigError(f"{where}: surface: doubled_m is {limits}; it has to be two distances, least first")
+    if figure.surface.cell_m <= 0 or figure.surface.cell_points < 2:
+        raise ConfigError(f"{where}: surface: cells have to have a size and two points or more")
+    return figure
+
+
+def _check_runs(study: RepeatedRuns, where: str) -> None:
+    """Checks what all experiments with repeated runs share."""
     for key in ("compared", "baselines"):
         if unknown := set(getattr(study, key)) - set(study.columns):
             raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
