@@ -341,7 +341,7 @@ struct Se3DepthCameraWarp {
   using Scalar = T;
   static constexpr int kParameters = 11;
   using Parameters = Eigen::Matrix<T, kParameters, 1>;
-  using Input = PixelAtDepth<T>;  ///< with rays of the camera that the warp was made with
+  using Input = PixelAtDepth<T>;  ///< with rays of the camera `of_rays`, depths as in Se3DepthWarp
 
   struct Point : Se3DepthWarp<T>::Point {
     Vector2<T> ray;                     ///< of the reference
@@ -387,6 +387,7 @@ struct Se3DepthCameraWarp {
   Se3DepthWarp<T> moved;
   Vector2<T> ray_scale, ray_shift;  ///< from the first camera's rays to those of the present one
 
+  /// @param of_rays that inputs have their rays from.
   Se3DepthCameraWarp(const Camera& camera, const SE3& T_cur_ref, T inverse_depth,
                      const Camera& of_rays)
       : moved(camera, T_cur_ref, inverse_depth),

@@ -14,6 +14,7 @@
 #include <sgf/apps/cli.h>
 #include <sgf/apps/sequence_run.h>
 #include <sgf/direct/direct_odometry.h>
+#include <sgf/direct/photometric_correction.h>
 #include <sgf/eval/statistics.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/dso_calibration.h>
@@ -92,35 +93,38 @@ class FrameSource {
  public:
   FrameSource(OdometrySequence sequence, Photometry photometry, const SequenceChange& change)
       : sequence_(std::move(sequence)),
-        photometry_(std::move(photometry)),
+        exposures_ms_(std::move(photometry.exposures_ms)),
         load_(change, sequence_.frames[0].time_ns),
         undistorter_(sequence_.cameras[0].camera) {
-    cv::Mat1f& vignette = photometry_.calibration.vignette;
-    if (!vignette.empty()) vignette = undistorter_.Undistort(vignette);
+    if (photometry.calibration.any())
+      correct_.emplace(photometry.calibration, cv::Size(sequence_.cameras[0].camera.width,
+                                                        sequence_.cameras[0].camera.height));
     for (const OdometryFrame& frame : sequence_.frames)
-      if (!photometry_.exposures_ms.empty() && !photometry_.exposures_ms.contains(frame.time_ns))
+      if (!exposures_ms_.empty() && !exposures_ms_.contains(frame.time_ns))
         throw Error("times.txt",
                     fmt::format("has no exposure of the frame at {} ns", frame.time_ns));
   }
 
   const OdometrySequence& sequence() const { return sequence_; }
   const Camera& camera() const { return undistorter_.camera(); }
-  const direct::PhotometricCalibration& calibration() const { return photometry_.calibration; }
   double clipped_share() const { return load_.clipped_share(); }
 
   std::optional<double> ExposureMs(const OdometryFrame& frame) const {
-    if (photometry_.exposures_ms.empty()) return std::nullopt;
-    return photometry_.exposures_ms.at(frame.time_ns);
+    if (exposures_ms_.empty()) return std::nullopt;
+    return exposures_ms_.at(frame.time_ns);
   }
 
+  /// Corrected before it is undistorted: interpolation is of light.
   cv::Mat Load(const OdometryFrame& frame) {
-    return undistorter_.Undistort(load_(frame.left, frame.time_ns, sequence_.cameras[0].camera));
+    const cv::Mat1b raw = load_(frame.left, frame.time_ns, sequence_.cameras[0].camera);
+    return undistorter_.Undistort(correct_ ? cv::Mat((*correct_)(raw)) : cv::Mat(raw));
   }
 
  private:
   OdometrySequence sequence_;
-  Photometry photometry_;
+  std::map<std::int64_t, double> exposures_ms_;
   ImageLoader load_;
+  std::optional<direct::PhotometricCorrection> correct_;
   odometry::Undistorter undistorter_;
 };
 
@@ -207,14 +211,15 @@ Run TrackSequence(FrameSource& source, std::span<const OdometryFrame> frames,
   return run;
 }
 
-/// Which of the maps has most poses.
-int LongestSegment(const std::vector<direct::DirectPose>& poses) {
+/// Numbers of the maps that have poses, that with most poses first.
+std::vector<int> Segments(const std::vector<direct::DirectPose>& poses) {
   std::map<int, int> counts;
   for (const direct::DirectPose& pose : poses) ++counts[pose.segment];
-  const auto longest =
-      std::max_element(counts.begin(), counts.end(),
-                       [](const auto& a, const auto& b) { return a.second < b.second; });
-  return longest == counts.end() ? 0 : longest->first;
+  std::vector<int> segments;
+  for (const auto& [segment, count] : counts) segments.push_back(segment);
+  std::stable_sort(segments.begin(), segments.end(),
+                   [&](int a, int b) { return counts[a] > counts[b]; });
+  return segments;
 }
 
 std::vector<TimedPose> OfSegment(const std::vector<direct::DirectPose>& poses, int segment) {
@@ -244,8 +249,7 @@ void WriteTimings(const fs::path& file, const std::vector<direct::DirectFrameRes
   WriteTextFile(file, text);
 }
 
-/// Points of a map in world coordinates. Where a point's depth is not known well, its position's
-/// variance along the ray is that of the inverse depth carried over.
+/// Points of a map in its world coordinates.
 void WritePoints(const fs::path& file, const std::vector<direct::MapPoint>& points, int segment) {
   std::vector<PlyPoint> cloud;
   for (const direct::MapPoint& point : points) {
@@ -265,12 +269,14 @@ void WritePoints(const fs::path& file, const std::vector<direct::MapPoint>& poin
 void WriteSummary(const fs::path& file, const FrameSource& source, const Run& run, int segment) {
   const auto& frames = run.frames;
   const Camera& c = run.camera;
-  const size_t posed = OfSegment(run.final, segment).size(), points = run.points.size();
+  const size_t posed = OfSegment(run.final, segment).size();
+  const auto points = std::count_if(run.points.begin(), run.points.end(),
+                                    [&](const auto& p) { return p.segment == segment; });
   int keyframes = 0;
   std::vector<double> total_ms;
   double sum_ms = 0;
   for (const direct::DirectFrameResult& f : frames) {
-    keyframes += f.new_keyframe;
+    keyframes += f.new_keyframe + f.new_map;  // a map begins with two
     total_ms.push_back(1e3 * f.times.total_s);
     sum_ms += total_ms.back();
   }
@@ -279,7 +285,7 @@ void WriteSummary(const fs::path& file, const FrameSource& source, const Run& ru
   const nlohmann::ordered_json summary = {{"sequence", source.sequence().name},
                                           {"frames", frames.size()},
                                           {"posed", posed},
-                                          {"segments", frames.back().segment + 1},
+                                          {"segments", Segments(run.final).size()},
                                           {"segment", segment},
                                           {"keyframes", keyframes},
                                           {"points", points},
@@ -303,22 +309,28 @@ void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
   Photometry photometry = ReadPhotometry(arguments, sequence.layout);
   FrameSource source(std::move(sequence), std::move(photometry), options.change);
   const auto frames = arguments.run.Chosen(source.sequence());
-  direct::DirectOdometry odometry(source.camera(), source.calibration(), options.odometry);
+  direct::DirectOdometry odometry(source.camera(), options.odometry);
   const fs::path folder = arguments.run.output;
   MakeFolder(folder);  // before the work, which would be lost
   if (const int skipped = source.sequence().skipped_frames)
     spdlog::warn("left out: {} x frame with a missing file", skipped);
   EventLog events(folder / "events.jsonl");
   const Run run = TrackSequence(source, frames, std::move(odometry), events);
-  const int segment = LongestSegment(run.final);
-  WriteTrajectory(folder / "trajectory.txt", OfSegment(run.final, segment));
-  WriteTrajectory(folder / "trajectory_online.txt", OfSegment(run.online, segment));
+  std::vector<int> segments = Segments(run.final);
+  if (segments.empty()) segments = {0};
+  for (const int segment : segments) {
+    const std::string suffix = segment == segments[0] ? "" : fmt::format("_segment_{}", segment);
+    WriteTrajectory(folder / fmt::format("trajectory{}.txt", suffix),
+                    OfSegment(run.final, segment));
+    WriteTrajectory(folder / fmt::format("trajectory_online{}.txt", suffix),
+                    OfSegment(run.online, segment));
+    WritePoints(folder / fmt::format("points{}.ply", suffix), run.points, segment);
+  }
   WriteFrames(folder / "frames.csv", run.frames);
   WriteTimings(folder / "timings.csv", run.frames);
   WriteRunOptions(folder / "options.yaml", WriteOptions(options));
   events.Close();
-  WritePoints(folder / "points.ply", run.points, segment);
-  WriteSummary(folder / "summary.json", source, run, segment);
+  WriteSummary(folder / "summary.json", source, run, segments[0]);
 }
 
 }  // namespace
@@ -329,9 +341,10 @@ int main(int argc, char** argv) {
   apps::Arguments arguments;
   CLI::App app(
       "Direct sparse odometry with one camera: writes trajectory.txt (TUM format: the camera's "
-      "pose at each frame's time, key-frames refined; of the map with most poses), "
-      "trajectory_online.txt (as known at frame time), points.ply, events.jsonl, frames.csv, "
-      "timings.csv, summary.json and options.yaml.",
+      "pose at each frame's time, key-frames refined; of the map with most poses, those of others "
+      "in "
+      "trajectory_segment_N.txt), trajectory_online.txt (as known at frame time), points.ply, "
+      "events.jsonl, frames.csv, timings.csv, summary.json and options.yaml.",
       "sgf_direct");
   arguments.run.AddTo(app);
   app.add_option(

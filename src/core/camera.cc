@@ -15,24 +15,16 @@ namespace sgf {
 namespace {
 
 /// Distort() for a fisheye lens: the image's radius grows with the angle to the axis.
-Eigen::Vector2d DistortFisheye(double omega, const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
+Eigen::Vector2d DistortFisheye(double omega, const Eigen::Vector2d& n) {
   const double widest = 2 * std::tan(omega / 2);
   const double r = n.norm();
   constexpr double kOnAxis = 1e-8;
-  const double scale = r < kOnAxis ? widest / omega : std::atan(r * widest) / (omega * r);
-  if (J) {
-    *J = scale * Eigen::Matrix2d::Identity();
-    if (r >= kOnAxis) {
-      const double slope = widest / (omega * (1 + r * r * widest * widest));
-      *J += (slope - scale) / (r * r) * n * n.transpose();
-    }
-  }
-  return scale * n;
+  return (r < kOnAxis ? widest / omega : std::atan(r * widest) / (omega * r)) * n;
 }
 
-/// Distorted normalised coordinates and, if asked for, their derivative by the undistorted ones.
+/// Radially and tangentially distorted normalised coordinates and, if asked for, their derivative
+/// by the undistorted ones.
 Eigen::Vector2d Distort(const Camera& c, const Eigen::Vector2d& n, Eigen::Matrix2d* J) {
-  if (c.omega != 0) return DistortFisheye(c.omega, n, J);
   const double x = n.x(), y = n.y(), r2 = n.squaredNorm();
   const double radial = 1 + r2 * (c.k1 + r2 * c.k2);
   if (J) {
@@ -54,21 +46,36 @@ double SquaredFoldRadius(const Camera& c) {
   return divisor > 0 ? 2 / divisor : std::numeric_limits<double>::infinity();
 }
 
-[[noreturn]] void FailToUnproject(const Eigen::Vector2d& pixel) {
-  throw Error("camera", fmt::format("no ray for pixel ({}, {}): the distortion folds back there",
-                                    pixel.x(), pixel.y()));
+/// Inverts DistortFisheye(); nothing from 90 degrees off the axis on.
+std::optional<Eigen::Vector2d> UndistortFisheye(double omega, const Eigen::Vector2d& d) {
+  const double r = d.norm();
+  const double widest = 2 * std::tan(omega / 2);
+  if (!(r * omega < std::numbers::pi / 2)) return std::nullopt;
+  constexpr double kOnAxis = 1e-8;
+  return r < kOnAxis ? omega / widest * d : std::tan(r * omega) / (widest * r) * d;
 }
 
 }  // namespace
 
 Eigen::Vector2d Camera::Project(const Eigen::Vector3d& point) const {
-  const Eigen::Vector2d d = Distort(*this, point.hnormalized(), nullptr);
+  const Eigen::Vector2d n = point.hnormalized();
+  const Eigen::Vector2d d = omega != 0 ? DistortFisheye(omega, n) : Distort(*this, n, nullptr);
   return {fx * d.x() + cx, fy * d.y() + cy};
 }
 
 Eigen::Vector3d Camera::Unproject(const Eigen::Vector2d& pixel) const {
+  if (const auto ray = TryUnproject(pixel)) return *ray;
+  throw Error("camera", fmt::format("no ray for pixel ({}, {}): the distortion folds back there",
+                                    pixel.x(), pixel.y()));
+}
+
+std::optional<Eigen::Vector3d> Camera::TryUnproject(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d target((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
   if (!distorted()) return target.homogeneous();
+  if (omega != 0) {
+    const auto n = UndistortFisheye(omega, target);
+    return n ? std::optional<Eigen::Vector3d>(n->homogeneous()) : std::nullopt;
+  }
   Eigen::Vector2d n = target;
   Eigen::Matrix2d J;
   for (int iteration = 0; iteration < 50; ++iteration) {
@@ -81,7 +88,7 @@ Eigen::Vector3d Camera::Unproject(const Eigen::Vector2d& pixel) const {
     if (J.determinant() <= 0) break;
     n += J.inverse() * error;
   }
-  FailToUnproject(pixel);
+  return std::nullopt;
 }
 
 void Camera::Check() const {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 namespace sgf {
@@ -24,6 +26,9 @@ struct Camera {
   /// Ray of a pixel: camera coordinates of its point at z = 1. Inverts the distortion to 1e-9 px.
   /// @throws Error where the distortion cannot be inverted (far outside the image it was made for).
   Eigen::Vector3d Unproject(const Eigen::Vector2d& pixel) const;
+
+  /// The same; nothing where there is no ray.
+  std::optional<Eigen::Vector3d> TryUnproject(const Eigen::Vector2d& pixel) const;
 
   /// @throws Error naming what is wrong with the parameters (sizes or focal lengths not positive,
   /// numbers not finite, omega outside [0, pi) or beside other distortion).

@@ -69,11 +69,15 @@ class Occupancy {
   cv::Mat1b cells_;
 };
 
+/// So much of a motion, at constant velocity.
+SE3 Part(const SE3& motion, double share) {
+  return {ExpSO3(share * LogSO3(motion.R)), share * motion.p};
+}
+
 /// Motions that may have happened since the last frame, T_cur_last, the likeliest first.
 std::vector<SE3> Hypotheses(const SE3& motion) {
   const SE3 none;
-  const SE3 half{ExpSO3(0.5 * LogSO3(motion.R)), 0.5 * motion.p};
-  std::vector<SE3> motions = {motion, none, half, motion * motion};
+  std::vector<SE3> motions = {motion, none, Part(motion, 0.5), motion * motion};
   // Turns about all axes and their diagonals, on top of the motion.
   for (const double angle : {0.02, 0.05})  // rad
     for (int x = -1; x <= 1; ++x)
@@ -97,6 +101,8 @@ void CheckOptions(const DirectOptions& options) {
   };
   if (options.tracking.residual == "bit_planes")
     throw Error("tracking.residual", "'bit_planes' has no window to go with it");
+  if (options.tracking.residual == "lssd" && options.tracking.pattern == alignment::Pattern::kPoint)
+    throw Error("tracking.residual", "'lssd' is constant over patches of one pixel");
   require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
   require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
   require(options.keyframes >= options.min_keyframes && options.keyframes <= 30, "keyframes",
@@ -112,15 +118,15 @@ void CheckOptions(const DirectOptions& options) {
 
 class DirectOdometry::Impl {
  public:
-  Impl(const Camera& camera, const PhotometricCalibration& calibration,
-       const DirectOptions& options)
-      : camera_(camera),
+  Impl(const Camera& camera, const DirectOptions& options)
+      : given_camera_(camera),
+        camera_(camera),
         options_(WithThreads(options)),
-        correction_(calibration, {camera.width, camera.height}),
         aligner_(camera, options_.tracking),
         depth_(MakeDepthEstimator(camera, options.depth)),
         selector_(options.selection),
-        spacing_px_(std::sqrt(0.5 * camera.width * camera.height / options.active_points)) {
+        first_spacing_px_(std::sqrt(0.5 * camera.width * camera.height / options.active_points)),
+        spacing_px_(first_spacing_px_) {
     CheckOptions(options);
     BeginMap();
   }
@@ -128,9 +134,10 @@ class DirectOdometry::Impl {
   DirectFrameResult Process(std::int64_t time_ns, const cv::Mat& grey,
                             std::optional<double> exposure_ms) {
     CheckFrame(time_ns, grey, exposure_ms);
+    last_time_ns_ = time_ns;
     DirectFrameResult result{.time_ns = time_ns, .segment = segment_};
     Stopwatch total, stage;
-    const cv::Mat1f image = correction_(grey);
+    const cv::Mat1f image = grey;  // converts where it is not float
     log_exposure_ = exposure_ms ? std::log(*exposure_ms / *first_exposure_ms_) : 0;
     if (!initializer_) {
       aligner_.MakePyramid(image, pyramid_);
@@ -149,7 +156,6 @@ class DirectOdometry::Impl {
       result.times.keyframe_s = stage.Lap();
     }
     if (!window_.empty()) result.T_world_cam = LastPose().Inverse();
-    last_time_ns_ = time_ns;
     result.segment = segment_;
     result.active_points = CountActive();
     result.times.total_s = total.Lap();
@@ -186,7 +192,7 @@ class DirectOdometry::Impl {
   /// A frame before there is a map.
   struct Waiting {
     std::int64_t time_ns = 0;
-    cv::Mat grey;  ///< 8-bit, as it came
+    cv::Mat grey;  ///< as it came
     double log_exposure = 0;
   };
 
@@ -196,8 +202,8 @@ class DirectOdometry::Impl {
   }
 
   void CheckFrame(std::int64_t time_ns, const cv::Mat& grey, std::optional<double> exposure_ms) {
-    if (grey.type() != CV_8UC1)
-      throw Error("image", fmt::format("is of type {}; it has to be 8-bit grey",
+    if (grey.type() != CV_8UC1 && grey.type() != CV_32FC1)
+      throw Error("image", fmt::format("is of type {}; it has to be 8-bit or float grey",
                                        cv::typeToString(grey.type())));
     if (grey.cols != camera_.width || grey.rows != camera_.height)
       throw Error("image", fmt::format("is {}x{} px; the camera has {}x{}", grey.cols, grey.rows,
@@ -233,6 +239,7 @@ class DirectOdometry::Impl {
   // --- Begin ---
 
   void BeginMap() {
+    if (options_.window.sigma_intrinsics > 0) UseCamera(given_camera_);
     initializer_.emplace(camera_, options_.initializer);
     waiting_.clear();
     lost_ = 0;
@@ -257,7 +264,7 @@ class DirectOdometry::Impl {
       result.new_keyframe = result.new_map = true;
       result.window = last_refinement_;
     }
-    const std::vector<Waiting> rest = std::exchange(waiting_, {});
+    waiting_.clear();
     if (result.new_map) {
       initializer_.reset();
     } else {
@@ -266,11 +273,9 @@ class DirectOdometry::Impl {
     }
   }
 
-  std::unique_ptr<Keyframe> NewKeyframe(std::int64_t time_ns, const SE3& T_cam_world,
-                                        double log_exposure) {
+  std::unique_ptr<Keyframe> NewKeyframe(const SE3& T_cam_world, double log_exposure) {
     auto frame = std::make_unique<Keyframe>();
     frame->id = static_cast<int>(keyframe_poses_.size());
-    frame->time_ns = time_ns;
     frame->T_cam_world = T_cam_world;
     frame->log_exposure = log_exposure;
     frame->brightness.a = log_exposure;
@@ -287,25 +292,25 @@ class DirectOdometry::Impl {
   /// The first two key-frames, from the waiting frames' motion.
   bool MakeMap(const InitialMotion& motion) {
     constexpr size_t kMostViews = 12;  // that depth is searched in
-    constexpr int kLeastPoints = 100;
+    const int least_points = std::min(100, options_.selection.points / 2);
     const SE3 T_world_first = records_.empty() ? SE3{} : LastPose().Inverse();
     const size_t last = waiting_.size() - 1;
     const size_t keyframes_before = keyframe_poses_.size();
     const auto pose_of = [&](size_t k) { return motion.T_cam_first[k] * T_world_first.Inverse(); };
 
-    auto first = NewKeyframe(waiting_[0].time_ns, pose_of(0), waiting_[0].log_exposure);
-    aligner_.MakePyramid(correction_(waiting_[0].grey), first->pyramid);
+    auto first = NewKeyframe(pose_of(0), waiting_[0].log_exposure);
+    aligner_.MakePyramid(waiting_[0].grey, first->pyramid);
     AddImmature(*first);
-    const size_t stride = std::max<size_t>(1, last / kMostViews);
+    const size_t stride = (last + kMostViews - 1) / kMostViews;
     for (size_t k = last % stride == 0 ? stride : last % stride; k <= last; k += stride) {
-      aligner_.MakePyramid(correction_(waiting_[k].grey), pyramid_);
+      aligner_.MakePyramid(waiting_[k].grey, pyramid_);
       // Where exposures are not known, the images' means have to do.
       Brightness brightness{waiting_[k].log_exposure, 0};
       if (!first_exposure_ms_) brightness.a = MeanLogRatio(*first, pyramid_);
       Trace(*first, pyramid_.samples[0], motion.T_cam_first[k],
             Between(first->brightness, brightness));
     }
-    auto second = NewKeyframe(waiting_[last].time_ns, pose_of(last), waiting_[last].log_exposure);
+    auto second = NewKeyframe(pose_of(last), waiting_[last].log_exposure);
     second->pyramid = std::move(pyramid_);
     pyramid_ = {};
     if (!first_exposure_ms_) second->brightness.a = MeanLogRatio(*first, second->pyramid);
@@ -315,15 +320,13 @@ class DirectOdometry::Impl {
                                  .inverse_depth = point.InverseDepth(),
                                  .observations = {{second->id}}});
     first->immature.clear();
+    first->points_made = static_cast<int>(first->points.size());
     optimizer_.emplace(camera_, options_.window, options_.threads);
     optimizer_->Anchor(*first);
-    first->in_prior = true;
-    first->linearization = first->T_cam_world;
-    first->brightness_linearization = first->brightness;
     window_.push_back(std::move(first));
     window_.push_back(std::move(second));
     for (int round = 0; round < 3; ++round) last_refinement_ = Refine();
-    if (CountActive() < kLeastPoints || !last_refinement_.usable) {
+    if (CountActive() < least_points || !last_refinement_.usable) {
       keyframe_poses_.resize(keyframes_before);
       return false;
     }
@@ -358,7 +361,7 @@ class DirectOdometry::Impl {
         (KeyframePose(window_.back()->id) * KeyframePose(first.id).Inverse()).p.norm() /
         motion.T_cam_first.back().p.norm();
     for (size_t k = 1; k + 1 < waiting_.size(); ++k) {
-      aligner_.MakePyramid(correction_(waiting_[k].grey), pyramid_);
+      aligner_.MakePyramid(waiting_[k].grey, pyramid_);
       SE3 guess = motion.T_cam_first[k];
       guess.p *= scale;
       const auto aligned = aligner_.Align(*reference, pyramid_, guess);
@@ -372,8 +375,12 @@ class DirectOdometry::Impl {
     const Record& last = records_.back();
     const SE3 T_last_ref = PoseOf(last) * KeyframePose(reference_id_).Inverse();
     SE3 motion;
-    if (records_.size() >= 2 && records_[records_.size() - 2].segment == segment_ && lost_ == 0)
-      motion = PoseOf(last) * PoseOf(records_[records_.size() - 2]).Inverse();
+    if (records_.size() >= 2 && records_[records_.size() - 2].segment == segment_ && lost_ == 0) {
+      const Record& before = records_[records_.size() - 2];
+      const double share = static_cast<double>(result.time_ns - last.time_ns) /
+                           static_cast<double>(last.time_ns - before.time_ns);
+      motion = Part(PoseOf(last) * PoseOf(before).Inverse(), share);
+    }
     alignment::AlignmentResult best;
     best.failure = alignment::AlignmentFailure::kFewPoints;
     for (const SE3& hypothesis : Hypotheses(motion)) {
@@ -394,10 +401,19 @@ class DirectOdometry::Impl {
     lost_ = 0;
     last_cost_ = best.mean_cost;
     result.state = DirectState::kTracked;
-    brightness_ = Apply(window_.back()->brightness, {best.alpha, best.beta});
+    brightness_ = BrightnessNow(best);
     result.brightness = brightness_;
     T_cur_ref_ = best.T_cur_ref;
     Believe(result.time_ns, reference_id_, best.T_cur_ref);
+  }
+
+  /// Of the frame at hand; where motion is estimated without it, as exposures or means say.
+  Brightness BrightnessNow(const alignment::AlignmentResult& aligned) const {
+    const Keyframe& newest = *window_.back();
+    if (options_.tracking.residual == "photo_affine")
+      return Apply(newest.brightness, {aligned.alpha, aligned.beta});
+    if (first_exposure_ms_) return {log_exposure_, 0};
+    return {newest.brightness.a + MeanLogRatio(newest, pyramid_), 0};
   }
 
   void Trace(Keyframe& host, const alignment::SampleChannels& image, const SE3& T_target_host,
@@ -475,7 +491,7 @@ class DirectOdometry::Impl {
   }
 
   void MakeKeyframe(DirectFrameResult& result) {
-    auto frame = NewKeyframe(result.time_ns, LastPose(), log_exposure_);
+    auto frame = NewKeyframe(LastPose(), log_exposure_);
     frame->brightness = brightness_;
     frame->pyramid = std::move(pyramid_);
     pyramid_ = std::exchange(spare_, {});
@@ -507,6 +523,7 @@ class DirectOdometry::Impl {
     Keyframe* host;
     size_t index;
     RefinedDepth refined = {};
+    std::vector<View> views = {};
   };
 
   /// Turns points that are found well into active ones, where the newest image has room.
@@ -514,7 +531,8 @@ class DirectOdometry::Impl {
     const Keyframe& newest = *window_.back();
     const int active = CountActive();
     if (active < 0.8 * options_.active_points) spacing_px_ = std::max(2., 0.85 * spacing_px_);
-    if (active > 1.1 * options_.active_points) spacing_px_ = std::min(40., 1.15 * spacing_px_);
+    if (active > 1.1 * options_.active_points)
+      spacing_px_ = std::min(3 * first_spacing_px_, 1.15 * spacing_px_);
     Occupancy taken(camera_, spacing_px_);
     for (const auto& host : window_) {
       const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
@@ -535,8 +553,9 @@ class DirectOdometry::Impl {
     ParallelForBatches(static_cast<int>(candidates.size()), options_.threads, [&](int k) {
       Candidate& candidate = candidates[k];
       const ImmaturePoint& point = candidate.host->immature[candidate.index];
-      candidate.refined = depth_->Refine(*candidate.host, point.pixel, point.InverseDepth(),
-                                         ViewsOf(*candidate.host, point));
+      candidate.views = ViewsOf(*candidate.host, point);
+      candidate.refined =
+          depth_->Refine(*candidate.host, point.pixel, point.InverseDepth(), candidate.views);
     });
     for (const Candidate& candidate : candidates) Promote(candidate);
     for (const auto& host : window_) Prune(*host);
@@ -566,11 +585,15 @@ class DirectOdometry::Impl {
 
   void Promote(const Candidate& candidate) {
     ImmaturePoint& point = candidate.host->immature[candidate.index];
-    const std::vector<View> views = ViewsOf(*candidate.host, point);
     point.outliers = INT_MAX;  // tried: leaves in any case
-    if (candidate.refined.seen_by.empty()) return;
+    // In maps whose median depth is about 1; without parallax nothing is known. DSO's limit.
+    constexpr double kLeastInformation = 100;
+    if (candidate.refined.seen_by.empty() || candidate.refined.information < kLeastInformation)
+      return;
     ActivePoint active{.pixel = point.pixel, .inverse_depth = candidate.refined.inverse_depth};
-    for (int k : candidate.refined.seen_by) active.observations.push_back({views[k].target->id});
+    for (int k : candidate.refined.seen_by)
+      active.observations.push_back({candidate.views[k].target->id});
+    ++candidate.host->points_made;
     candidate.host->points.push_back(active);
   }
 
@@ -610,10 +633,10 @@ class DirectOdometry::Impl {
           frame.points.begin(), frame.points.end(),
           [&](const ActivePoint& point) { return SeenBy(point, window_[newest]->id); });
       constexpr double kLeastSeen = 0.05;
+      const auto in_view = static_cast<double>(seen + std::ssize(frame.immature));
       const double gain = std::abs(frame.brightness.a - window_[newest]->brightness.a);
       constexpr double kMostGain = 0.7;
-      if (static_cast<double>(seen) < kLeastSeen * std::max(1, frame.points_made) ||
-          gain > kMostGain) {
+      if (in_view < kLeastSeen * std::max(1, frame.points_made) || gain > kMostGain) {
         leaving.push_back(k);
         --left;
       }
@@ -641,8 +664,6 @@ class DirectOdometry::Impl {
 
   /// Points and key-frames leave the window: what they say stays as the prior, or is dropped.
   void LeaveWindow() {
-    for (const auto& frame : window_)
-      frame->points_made = std::max(frame->points_made, static_cast<int>(frame->points.size()));
     const std::vector<int> leaving = Leaving();
     const int newest = static_cast<int>(window_.size()) - 1;
     std::vector<std::pair<int, const ActivePoint*>> marginalised;
@@ -681,14 +702,11 @@ class DirectOdometry::Impl {
     for (const auto& host : window_) {
       for (ActivePoint& point : host->points)
         std::erase_if(point.observations, [&](const Observation& o) { return o.target == id; });
-      std::erase_if(host->points,
-                    [](const ActivePoint& point) { return point.observations.empty(); });
     }
   }
 
-  Camera camera_;
+  Camera given_camera_, camera_;
   DirectOptions options_;
-  PhotometricCorrection correction_;
   alignment::DirectAligner aligner_;
   std::unique_ptr<const DepthEstimator> depth_;
   PixelSelector selector_;
@@ -698,7 +716,7 @@ class DirectOdometry::Impl {
   std::optional<WindowOptimizer> optimizer_;
   Window window_;
   WindowSummary last_refinement_;
-  double spacing_px_;
+  double first_spacing_px_, spacing_px_;
 
   std::vector<ReferencePoint> reference_points_;  ///< in the newest key-frame
   std::shared_ptr<const alignment::DirectAligner::Reference> reference_;
@@ -720,9 +738,8 @@ class DirectOdometry::Impl {
   std::optional<double> first_exposure_ms_;
 };
 
-DirectOdometry::DirectOdometry(const Camera& camera, const PhotometricCalibration& calibration,
-                               const DirectOptions& options)
-    : impl_(std::make_unique<Impl>(camera, calibration, options)) {}
+DirectOdometry::DirectOdometry(const Camera& camera, const DirectOptions& options)
+    : impl_(std::make_unique<Impl>(camera, options)) {}
 DirectOdometry::~DirectOdometry() = default;
 DirectOdometry::DirectOdometry(DirectOdometry&&) noexcept = default;
 DirectOdometry& DirectOdometry::operator=(DirectOdometry&&) noexcept = default;

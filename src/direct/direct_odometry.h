@@ -15,7 +15,6 @@
 #include <sgf/core/se3.h>
 #include <sgf/direct/frame.h>
 #include <sgf/direct/initializer.h>
-#include <sgf/direct/photometric_correction.h>
 #include <sgf/direct/pixel_selection.h>
 #include <sgf/direct/tracing.h>
 #include <sgf/direct/window.h>
@@ -101,7 +100,7 @@ struct DirectFrameResult {
   /// Number of the map, counted from 0. Each begins at the last believed pose and has a scale of
   /// its own.
   int segment = 0;
-  SE3 T_world_cam = {};  ///< if tracked
+  SE3 T_world_cam = {};  ///< in the segment's world and units; if not tracked, the last one
   bool new_keyframe = false;
   bool new_map = false;     ///< this frame is the first with a pose of its segment
   double inlier_share = 0;  ///< of the points in view
@@ -122,10 +121,10 @@ struct DirectPose {
 
 /// A point of the map.
 struct MapPoint {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in the world
-  double inverse_depth = 0;                            ///< in its key-frame
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in its segment's world and units
+  double inverse_depth = 0;                            ///< in its key-frame, 1/unit
   double inverse_depth_variance = 0;
-  int support = 0;  ///< key-frames that saw it
+  int support = 0;  ///< key-frames that saw it, its own not counted
   float grey = 0;   ///< grey levels
   int keyframe = 0;
   int segment = 0;
@@ -136,18 +135,16 @@ struct MapPoint {
 class DirectOdometry {
  public:
   /// @param camera without distortion.
-  /// @throws Error for a camera with distortion or out of range, a photometric calibration that
-  ///   does not fit, or an option out of range.
-  DirectOdometry(const Camera& camera, const PhotometricCalibration& calibration,
-                 const DirectOptions& options);
+  /// @throws Error for a camera with distortion or out of range, or an option out of range.
+  DirectOdometry(const Camera& camera, const DirectOptions& options);
   ~DirectOdometry();
   DirectOdometry(DirectOdometry&&) noexcept;
   DirectOdometry& operator=(DirectOdometry&&) noexcept;
 
-  /// @param grey 8-bit, of the camera's size.
+  /// @param grey 8-bit, or float as PhotometricCorrection gives it; of the camera's size.
   /// @param exposure_ms where it is known; then for all frames.
-  /// @throws Error for another type or size, a time not after the last one, or an exposure that is
-  ///   not positive. The state is as before the call.
+  /// @throws Error for another type or size, a time not after the last one, an exposure that is
+  ///   not positive, or one of some frames only. The state is as before the call.
   DirectFrameResult Process(std::int64_t time_ns, const cv::Mat& grey,
                             std::optional<double> exposure_ms = std::nullopt);
 
@@ -158,7 +155,8 @@ class DirectOdometry {
   /// As it is known now: the one given, unless `window.sigma_intrinsics` has it refined.
   const Camera& camera() const;
 
-  /// Points that have left the window since the last call.
+  /// Points that have left the window since the last call. They are kept until then: call it now
+  /// and then for memory not to grow.
   std::vector<MapPoint> TakeFinishedPoints();
 
   /// Points of the window, as they are now.

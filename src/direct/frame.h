@@ -67,22 +67,21 @@ struct ImmaturePoint {
 /// How a point of the window is seen by another key-frame.
 struct Observation {
   int target = 0;        ///< id of the key-frame
-  double mean_cost = 0;  ///< of its pixels at the last look, in squared scales of the loss
+  bool counted = false;  ///< in the point's support
 };
 
 /// A pixel of a key-frame whose depth is known and refined in the window.
 struct ActivePoint {
   Eigen::Vector2f pixel;
   double inverse_depth = 0;
-  double variance = 0;  ///< of the inverse depth
-  int support = 0;      ///< good observations so far, those of frames that left as well
+  double variance = INFINITY;  ///< of the inverse depth
+  int support = 0;             ///< key-frames that saw it so far, those that left as well
   std::vector<Observation> observations = {};
 };
 
 /// A key-frame of the window.
 struct Keyframe {
   int id = 0;
-  std::int64_t time_ns = 0;
   SE3 T_cam_world = {};
   Brightness brightness = {};
   double log_exposure = 0;  ///< what `a` is expected to be

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/core.h>
 
@@ -14,8 +15,8 @@ PhotometricCorrection::PhotometricCorrection(const PhotometricCalibration& calib
   if (!response.empty() && response.size() != 256)
     throw Error("inverse response",
                 fmt::format("has {} values; it has to have 256, or none", response.size()));
-  if (std::adjacent_find(response.begin(), response.end(), std::greater_equal<>()) !=
-      response.end())
+  const auto falls = [](double a, double b) { return !(a < b && std::isfinite(a + b)); };
+  if (std::adjacent_find(response.begin(), response.end(), falls) != response.end())
     throw Error("inverse response", "does not rise");
   for (int level = 0; level < 256; ++level)
     lookup_(level) = response.empty()

@@ -12,6 +12,8 @@ namespace sgf::direct {
 struct PhotometricCalibration {
   std::vector<double> inverse_response = {};  ///< G^-1 at levels 0 to 255, rising; empty: linear
   cv::Mat1f vignette = {};                    ///< V in (0, 1] at every pixel; empty: 1
+
+  bool any() const { return !inverse_response.empty() || !vignette.empty(); }
 };
 
 /// Makes images linear in irradiance.

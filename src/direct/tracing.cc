@@ -228,7 +228,8 @@ class DepthEstimatorOf : public DepthEstimator {
       if (std::abs(k - best) > kOwnRadius) second = std::min(second, costs[k]);
     // A short line has no second best and says nothing new about ambiguity.
     const float quality = second / std::max(costs[best], 1e-12f);
-    if (steps > 10 || quality < point.quality) point.quality = std::min(quality, 1e6f);
+    if (steps > 10 || point.found == 0 || quality < point.quality)
+      point.quality = std::min(quality, 1e6f);
     warp.inverse_depth = InverseDepthAt(line, static_cast<float>(best) * stride);
     point.status = TraceStatus::kGood;
   }

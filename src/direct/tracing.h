@@ -67,7 +67,7 @@ class DepthEstimator {
                      ImmaturePoint& point) const = 0;
 
   /// Refines an inverse depth over all views at once, along the epipolar lines.
-  /// @return no views where too few agree.
+  /// @return no views where none agrees.
   virtual RefinedDepth Refine(const Keyframe& host, const Eigen::Vector2f& pixel,
                               double inverse_depth, std::span<const View> views) const = 0;
 };

@@ -91,12 +91,15 @@ class CameraCost : public ceres::SizedCostFunction<kFrameParameters, kFrameParam
 };
 
 /// What is known of a brightness beforehand.
+struct BrightnessBelief {
+  Eigen::Vector2d sigma;
+  Eigen::Vector2d offset;  ///< of the linearisation from what is expected
+};
+
 class BrightnessCost : public ceres::SizedCostFunction<2, kFrameParameters> {
  public:
-  BrightnessCost(const Keyframe& frame, double sigma_a, double sigma_b)
-      : sigma_(sigma_a, sigma_b),
-        offset_(frame.brightness_linearization.a - frame.log_exposure,
-                frame.brightness_linearization.b) {}
+  explicit BrightnessCost(const BrightnessBelief& belief)
+      : sigma_(belief.sigma), offset_(belief.offset) {}
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
     for (int k = 0; k < 2; ++k) {
@@ -576,9 +579,7 @@ class WindowOptimizer::Engine {
     problem.AddResidualBlock(&window_cost, nullptr, blocks);
     std::deque<BrightnessCost> brightness;  // cost functions cannot be moved
     for (size_t k = 0; k < window.size(); ++k) {
-      brightness.emplace_back(*window[k],
-                              exposures_known ? options_.sigma_a_known : options_.sigma_a,
-                              exposures_known ? options_.sigma_b_known : options_.sigma_b);
+      brightness.emplace_back(BrightnessKnown(*window[k], exposures_known));
       problem.AddResidualBlock(&brightness.back(), nullptr, blocks[k]);
     }
     CameraCost camera_cost(camera_linearization_, given_camera_, options_.sigma_intrinsics);
@@ -609,6 +610,7 @@ class WindowOptimizer::Engine {
       FrameOf(x_, k) = parameters[k];
       summary.usable = summary.usable && parameters[k].allFinite();
     }
+    if (refines_camera_) summary.usable = summary.usable && IsPlausible(parameters.back());
     if (!summary.usable) {
       x_ = before;
       for (Point& point : points_) point.information = 0;  // depths stay as well
@@ -617,20 +619,53 @@ class WindowOptimizer::Engine {
     return summary;
   }
 
+  /// Whether the focal lengths are within a factor of two of those given.
+  bool IsPlausible(const FrameParameters& camera) const {
+    const double fx = camera_linearization_.fx + camera(0),
+                 fy = camera_linearization_.fy + camera(1);
+    const auto near = [](double a, double b) { return a > 0.5 * b && a < 2 * b; };
+    return near(fx, given_camera_.fx) && near(fy, given_camera_.fy);
+  }
+
+ public:
+  /// Adds what is known of a key-frame's brightness beforehand.
+  void AddBrightness(const Keyframe& frame, bool exposures_known, Prior& prior) const {
+    const BrightnessBelief belief = BrightnessKnown(frame, exposures_known);
+    const Eigen::Array2d weight = belief.sigma.array().square().inverse();
+    FrameParameters H = FrameParameters::Zero(), b = H;
+    H.tail<2>() = weight;
+    b.tail<2>() = weight * belief.offset.array();
+    prior.Add({frame.id}, H.asDiagonal().toDenseMatrix(), b);
+  }
+
+ private:
+  BrightnessBelief BrightnessKnown(const Keyframe& frame, bool exposures_known) const {
+    const Eigen::Vector2d sigma =
+        exposures_known ? Eigen::Vector2d(options_.sigma_a_known, options_.sigma_b_known)
+                        : Eigen::Vector2d(options_.sigma_a, options_.sigma_b);
+    // Where the residual says nothing of brightness it stays as tracking found it.
+    const bool stays = !patches_->has_brightness() && !exposures_known;
+    const Brightness expected = stays ? frame.brightness : Brightness{frame.log_exposure, 0};
+    return {sigma,
+            {frame.brightness_linearization.a - expected.a,
+             frame.brightness_linearization.b - expected.b}};
+  }
+
   void WriteBack(Window& window, WindowSummary& summary) {
     Evaluate(window, true);
     for (const Point& from : points_) {
       ActivePoint& point = *from.point;
       point.inverse_depth = from.depth;
       point.variance = from.information > 0 ? 1 / from.information : INFINITY;
-      point.observations.clear();
+      std::vector<Observation> good;
       for (int i = from.first; i < from.last; ++i) {
         if (items_[i].sight != Sight::kGood) continue;
-        point.observations.push_back(
-            {window[items_[i].target]->id, 2 * items_[i].cost / kPatchPixels});
+        Observation& observation = good.emplace_back(point.observations[i - from.first]);
+        point.support += !observation.counted;
+        observation.counted = true;
       }
+      point.observations = std::move(good);
       const int seen = static_cast<int>(point.observations.size());
-      point.support = std::max(point.support, seen);
       summary.observations += seen;
       summary.outliers += from.last - from.first - seen;
     }
@@ -687,7 +722,10 @@ WindowOptimizer::~WindowOptimizer() = default;
 
 const Camera& WindowOptimizer::camera() const { return engine_->camera(); }
 
-void WindowOptimizer::Anchor(const Keyframe& first) {
+void WindowOptimizer::Anchor(Keyframe& first) {
+  first.in_prior = true;
+  first.linearization = first.T_cam_world;
+  first.brightness_linearization = first.brightness;
   constexpr int n = kFrameParameters;
   Eigen::Matrix<double, n, n> H = Eigen::Matrix<double, n, n>::Zero();
   H.diagonal().head<6>().setConstant(kHeld);
@@ -696,6 +734,7 @@ void WindowOptimizer::Anchor(const Keyframe& first) {
 }
 
 WindowSummary WindowOptimizer::Refine(Window& window, bool exposures_known) {
+  exposures_known_ = exposures_known;
   return engine_->Refine(window, prior_, exposures_known);
 }
 
@@ -706,8 +745,9 @@ void WindowOptimizer::Marginalize(Window& window,
 
 void WindowOptimizer::Marginalize(const Keyframe& frame) {
   const auto& frames = prior_.frames();
-  if (std::find(frames.begin(), frames.end(), frame.id) != frames.end())
-    prior_.Marginalize(frame.id);
+  if (std::find(frames.begin(), frames.end(), frame.id) == frames.end()) return;
+  engine_->AddBrightness(frame, exposures_known_, prior_);
+  prior_.Marginalize(frame.id);
 }
 
 }  // namespace sgf::direct

@@ -45,9 +45,9 @@ void CheckOptions(const WindowOptions& options);
 
 /// What a refinement has done.
 struct WindowSummary {
-  int iterations = 0;
+  int iterations = 0;    ///< of the solver, with that of the first look
   int observations = 0;  ///< that were kept
-  int outliers = 0;      ///< that were taken out
+  int outliers = 0;      ///< that were taken out, those out of view as well
   double scale = 0;      ///< of the residuals: what "1 sigma" means in the loss
   bool usable = false;   ///< false where the solver has failed; the window is as before then
 };
@@ -61,8 +61,8 @@ class WindowOptimizer {
   WindowOptimizer(const Camera& camera, const WindowOptions& options, int threads);
   ~WindowOptimizer();
 
-  /// Holds the pose of a map's first key-frame.
-  void Anchor(const Keyframe& first);
+  /// Holds the pose of a map's first key-frame, and takes its derivatives where it is now.
+  void Anchor(Keyframe& first);
 
   /// Refines poses, brightness and inverse depths; takes out observations that do not fit and
   /// points without any. Points get their variance and support.
@@ -86,6 +86,7 @@ class WindowOptimizer {
 
   std::unique_ptr<Engine> engine_;
   Prior prior_;
+  bool exposures_known_ = false;  ///< at the last refinement
 };
 
 }  // namespace sgf::direct

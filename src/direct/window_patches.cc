@@ -114,6 +114,7 @@ class WindowPatchesOf : public WindowPatches {
   }
 
   int dim() const override { return kDim; }
+  bool has_brightness() const override { return kBrightness; }
 
  private:
   static const Warp& WarpOf(const CameraWarp& warp) {

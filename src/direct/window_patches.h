@@ -62,6 +62,9 @@ class WindowPatches {
 
   /// Components of a pixel's residual.
   virtual int dim() const = 0;
+
+  /// Whether it depends on the brightness.
+  virtual bool has_brightness() const = 0;
 };
 
 /// Whether a window can be refined with a residual, and its camera as well.

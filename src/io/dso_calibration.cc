@@ -102,8 +102,7 @@ Camera ReadCameraTxt(const std::filesystem::path& path) {
   if (fields.size() != 2) throw Error(AtLine(path, 2), "expected width and height");
   camera.width = NumberField<int>(fields[0], AtLine(path, 2));
   camera.height = NumberField<int>(fields[1], AtLine(path, 2));
-  constexpr double kMostShare = 1.5;
-  if (std::max({camera.fx, camera.fy, camera.cx, camera.cy}) < kMostShare) {
+  if (camera.cx < 1 && camera.cy < 1) {  // DSO's rule
     camera.fx *= camera.width;
     camera.fy *= camera.height;
     camera.cx = camera.cx * camera.width - 0.5;

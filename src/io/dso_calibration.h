@@ -44,8 +44,8 @@ cv::Mat1f ReadVignette(const std::filesystem::path& path);
 
 /// Reads the camera of camera.txt: "fx fy cx cy omega", or these names and numbers: "Pinhole fx fy
 /// cx cy 0", "FOV fx fy cx cy omega", "RadTan fx fy cx cy k1 k2 p1 p2"; then a line with width and
-/// height. Focal lengths and centre are shares of these sizes where all are below 1.5, as TUM's are
-/// (the image's upper left corner is (0, 0) then). Further lines, on the images DSO makes, do not
+/// height. Focal lengths and centre are shares of these sizes where the centre is below 1, as TUM's
+/// are (the image's upper left corner is (0, 0) then). Further lines, on the images DSO makes, do not
 /// count.
 /// @throws Error naming file and line for a missing file, another model, what is no number, and as
 ///   Camera::Check().

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 
 #include <Eigen/Geometry>
 #include <fmt/core.h>
@@ -55,10 +56,13 @@ Eigen::Matrix3d RectifiedAxes(const SE3& T_left_right) {
   return axes;
 }
 
-// Where a raw pixel lies in normalised rectified coordinates.
-Eigen::Vector2d RectifiedRay(const Camera& camera, const Eigen::Matrix3d& R_raw_rect, double x,
-                             double y) {
-  const Eigen::Vector3d ray = R_raw_rect.transpose() * camera.Unproject({x, y});
+// Where a raw pixel lies in normalised rectified coordinates; nothing for a fisheye lens' pixels
+// from 90 degrees off its axis on, which are farther out than all others.
+std::optional<Eigen::Vector2d> RectifiedRay(const Camera& camera, const Eigen::Matrix3d& R_raw_rect,
+                                            double x, double y) {
+  const auto raw = camera.TryUnproject({x, y});
+  if (!raw && camera.omega != 0) return std::nullopt;
+  const Eigen::Vector3d ray = R_raw_rect.transpose() * (raw ? *raw : camera.Unproject({x, y}));
   if (ray.z() <= 0)
     throw Error(kWhere, fmt::format("pixel ({}, {}) looks away from the common view", x, y));
   return ray.hnormalized();
@@ -69,12 +73,16 @@ Eigen::Vector2d RectifiedRay(const Camera& camera, const Eigen::Matrix3d& R_raw_
 void ShrinkToImage(const Camera& camera, const Eigen::Matrix3d& R_raw_rect, View& view) {
   const double right = camera.width - 1, bottom = camera.height - 1;
   for (int y = 0; y < camera.height; ++y) {
-    view.left = std::max(view.left, RectifiedRay(camera, R_raw_rect, 0, y).x());
-    view.right = std::min(view.right, RectifiedRay(camera, R_raw_rect, right, y).x());
+    if (const auto ray = RectifiedRay(camera, R_raw_rect, 0, y))
+      view.left = std::max(view.left, ray->x());
+    if (const auto ray = RectifiedRay(camera, R_raw_rect, right, y))
+      view.right = std::min(view.right, ray->x());
   }
   for (int x = 0; x < camera.width; ++x) {
-    view.top = std::max(view.top, RectifiedRay(camera, R_raw_rect, x, 0).y());
-    view.bottom = std::min(view.bottom, RectifiedRay(camera, R_raw_rect, x, bottom).y());
+    if (const auto ray = RectifiedRay(camera, R_raw_rect, x, 0))
+      view.top = std::max(view.top, ray->y());
+    if (const auto ray = RectifiedRay(camera, R_raw_rect, x, bottom))
+      view.bottom = std::min(view.bottom, ray->y());
   }
 }
 

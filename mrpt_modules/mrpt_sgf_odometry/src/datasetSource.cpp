@@ -79,7 +79,7 @@ class CDatasetSource : public CObservationSource
 		: m_sequence(openSequence(folder, options.layout))
 	{
 		if (!m_sequence.stereo() && !m_sequence.has_depth())
-			throw Error(folder, "has one camera and no depth");
+			throw ::sgf::Error(folder, "has one camera and no depth");
 		auto& frames = m_sequence.frames;
 		if (options.max_frames > 0 && options.max_frames < frames.size())
 			frames.resize(options.max_frames);

@@ -124,10 +124,18 @@ TEST(Camera, FisheyeRadiusGrowsWithTheAngle) {
     EXPECT_NEAR(pixel.x(), camera.cx + camera.fx * 0.6 * radius, 1e-9);
     EXPECT_NEAR(pixel.y(), camera.cy + camera.fy * 0.8 * radius, 1e-9);
   }
-  for (const auto& p : AllPixels(camera)) {
+  int with_ray = 0;
+  const std::vector<cv::Point2d> pixels = AllPixels(camera);
+  for (const auto& p : pixels) {
     const Eigen::Vector2d pixel(p.x, p.y);
-    ASSERT_LT((camera.Project(camera.Unproject(pixel)) - pixel).norm(), 1e-8) << pixel.transpose();
+    const auto ray = camera.TryUnproject(pixel);
+    if (!ray) continue;
+    ++with_ray;
+    ASSERT_LT((camera.Project(*ray) - pixel).norm(), 1e-8) << pixel.transpose();
   }
+  EXPECT_GT(with_ray, 0.9 * pixels.size());
+  EXPECT_FALSE(camera.TryUnproject({0, 0})) << "more than 90 degrees off the axis";
+  EXPECT_THAT(ErrorMessage([&] { camera.Unproject({0, 0}); }), HasSubstr("no ray"));
 }
 
 TEST(Camera, NamesWhatIsWrongWithItsParameters) {

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -32,15 +33,19 @@ DirectOptions Options() {
 /// A camera that is carried along PoseAt().
 struct Flight {
   explicit Flight(const DirectOptions& options = Options(), const Camera& believed = kCamera)
-      : odometry(believed, {}, options) {}
+      : odometry(believed, options) {}
 
   test::CornerWorld world{kCamera};
   DirectOdometry odometry;
   std::vector<TimedPose> truth = {};
 
-  DirectFrameResult Fly(int k, double gain = 1) {
-    truth.push_back({k * kPeriod, PoseAt(k)});
-    return odometry.Process(k * kPeriod, world.Render(PoseAt(k), gain).grey);
+  DirectFrameResult Fly(int k, double gain = 1, std::optional<double> exposure_ms = std::nullopt) {
+    return FlyTo(PoseAt(k), k, gain, exposure_ms);
+  }
+  DirectFrameResult FlyTo(const SE3& pose, int k, double gain = 1,
+                          std::optional<double> exposure_ms = std::nullopt) {
+    truth.push_back({k * kPeriod, pose});
+    return odometry.Process(k * kPeriod, world.Render(pose, gain).grey, exposure_ms);
   }
   DirectFrameResult Show(int k, const cv::Mat& image) {
     return odometry.Process(k * kPeriod, image);
@@ -83,6 +88,36 @@ TEST(DirectOdometry, FollowsThroughJumpsOfTheExposure) {
   EXPECT_LT(scores.ate_rmse_m, 0.015 * scores.path_m);
 }
 
+TEST(DirectOdometry, TakesExposuresThatAreKnown) {
+  DirectOptions options = Options();
+  options.window.sigma_a_known = 1e-3;
+  Flight flight(options);
+  int checked = 0;
+  for (int k = 0; k < 50; ++k) {
+    const double gain = k / 8 % 2 ? 0.7 : 1;
+    const DirectFrameResult result = flight.Fly(k, gain, 4 * gain);
+    if (!result.new_keyframe || result.new_map) continue;
+    EXPECT_NEAR(result.brightness.a, std::log(gain), 0.05) << k;
+    ++checked;
+  }
+  EXPECT_GT(checked, 2);
+  EXPECT_LT(flight.Scores().ate_rmse_m, 0.015 * flight.Scores().path_m);
+}
+
+TEST(DirectOdometry, GoesOnAfterTurningOnTheSpot) {
+  Flight flight;
+  int k = 0;
+  for (; k < 30; ++k) flight.Fly(k);
+  for (; k < 50; ++k) {
+    const double turn = 0.1 * std::sin(0.3 * (k - 29));
+    flight.FlyTo(PoseAt(29) * SE3{ExpSO3({0, turn, 0}), {0, 0, 0}}, k);
+  }
+  for (; k < 75; ++k) flight.FlyTo(PoseAt(k - 20), k);
+  const TrajectoryScores scores = flight.Scores();
+  EXPECT_GE(scores.poses, 74);
+  EXPECT_LT(scores.ate_rmse_m, 0.015 * scores.path_m);
+}
+
 TEST(DirectOdometry, PointsLieOnTheWalls) {
   Flight flight;
   for (int k = 0; k < 40; ++k) flight.Fly(k);
@@ -107,6 +142,7 @@ TEST(DirectOdometry, IsTheSameForAnyNumberOfThreads) {
     for (int k = 0; k < 25; ++k) flight.Fly(k);
     runs.push_back(flight.odometry.Trajectory());
   }
+  ASSERT_GT(runs[0].size(), 20u);
   ASSERT_EQ(runs[0].size(), runs[1].size());
   for (size_t k = 0; k < runs[0].size(); ++k)
     EXPECT_EQ(runs[0][k].T_world_cam.Matrix(), runs[1][k].T_world_cam.Matrix());
@@ -125,8 +161,17 @@ TEST(DirectOdometry, SaysWhenItIsLostAndBeginsANewMap) {
   EXPECT_EQ(result.state, DirectState::kTracked);
   EXPECT_EQ(result.segment, 1);
   EXPECT_TRUE(result.new_map);
-  for (const DirectPose& pose : flight.odometry.Trajectory())
+  std::set<int> segments;
+  for (const DirectPose& pose : flight.odometry.Trajectory()) {
     EXPECT_TRUE(pose.T_world_cam.Matrix().allFinite());
+    segments.insert(pose.segment);
+    if (pose.time_ns < 25 * kPeriod) {
+      EXPECT_EQ(pose.segment, 0);
+    }
+  }
+  EXPECT_EQ(segments, (std::set{0, 1}));
+  for (const MapPoint& point : flight.odometry.TakeFinishedPoints()) EXPECT_EQ(point.segment, 0);
+  for (const MapPoint& point : flight.odometry.ActivePoints()) EXPECT_EQ(point.segment, 1);
 }
 
 TEST(DirectOdometry, MakesNoMapOfNothing) {
@@ -191,7 +236,7 @@ TEST(DirectOdometry, RefusesBadInputAndGoesOn) {
   };
   EXPECT_THAT(refusal(0, Black()), HasSubstr("not after the last one"));
   EXPECT_THAT(refusal(kPeriod, cv::Mat1b(240, 321)), HasSubstr("321x240"));
-  EXPECT_THAT(refusal(kPeriod, cv::Mat1f(240, 320)), HasSubstr("8-bit grey"));
+  EXPECT_THAT(refusal(kPeriod, cv::Mat1d(240, 320)), HasSubstr("8-bit or float grey"));
   EXPECT_THAT(refusal(kPeriod, {}), HasSubstr("image"));
   EXPECT_THAT(refusal(kPeriod, Black(), 3.), HasSubstr("some frames only"));
   EXPECT_THAT(refusal(kPeriod, Black(), -3.), HasSubstr("positive"));
@@ -202,7 +247,7 @@ TEST(DirectOdometry, RefusesOptionsOutOfRange) {
   const auto refusal = [](const auto& change) {
     DirectOptions options = Options();
     change(options);
-    return ErrorMessage([&] { DirectOdometry(kCamera, {}, options); });
+    return ErrorMessage([&] { DirectOdometry(kCamera, options); });
   };
   EXPECT_THAT(refusal([](auto& o) { o.active_points = 1; }), HasSubstr("active_points"));
   EXPECT_THAT(refusal([](auto& o) { o.keyframes = 2; }), HasSubstr("keyframes"));
@@ -210,8 +255,7 @@ TEST(DirectOdometry, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refusal([](auto& o) { o.depth.residual = "lssd"; }), HasSubstr("estimate depth"));
   Camera distorted = kCamera;
   distorted.k1 = -0.2;
-  EXPECT_THAT(ErrorMessage([&] { DirectOdometry(distorted, {}, Options()); }),
-              HasSubstr("distortion"));
+  EXPECT_THAT(ErrorMessage([&] { DirectOdometry(distorted, Options()); }), HasSubstr("distortion"));
 }
 
 }  // namespace

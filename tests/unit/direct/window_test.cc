@@ -65,8 +65,6 @@ TEST(Window, FindsPosesAndDepths) {
     Window window = Disturbed({1, 1, 1}, 0.01);
     WindowOptimizer optimizer(kCamera, {.residual = residual, .max_iterations = 20}, 1);
     optimizer.Anchor(*window[0]);
-    window[0]->in_prior = true;
-    window[0]->linearization = window[0]->T_cam_world;
     const double before = PoseError(window, 2);
     WindowSummary summary;
     for (int round = 0; round < 3; ++round) summary = optimizer.Refine(window, false);
@@ -82,8 +80,6 @@ TEST(Window, EstimatesBrightness) {
   Window window = Disturbed({1, 0.7}, 0.002);
   WindowOptimizer optimizer(kCamera, {.max_iterations = 20}, 1);
   optimizer.Anchor(*window[0]);
-  window[0]->in_prior = true;
-  window[0]->linearization = window[0]->T_cam_world;
   for (int round = 0; round < 3; ++round) optimizer.Refine(window, false);
   const RelativeBrightness relative = Between(window[0]->brightness, window[1]->brightness);
   EXPECT_NEAR(relative.alpha, -std::log(0.7), 0.05);
@@ -100,8 +96,6 @@ TEST(Window, RefinesTheCamera) {
     Window window = Disturbed({1, 1, 1, 1, 1, 1}, 0.002, WideTruthAt);
     WindowOptimizer optimizer(wrong, {.max_iterations = 20, .sigma_intrinsics = sigma_px}, 1);
     optimizer.Anchor(*window[0]);
-    window[0]->in_prior = true;
-    window[0]->linearization = window[0]->T_cam_world;
     for (int round = 0; round < 3; ++round) optimizer.Refine(window, false);
     const Camera& found = optimizer.camera();
     errors.push_back(std::abs(found.fx - kCamera.fx) + std::abs(found.fy - kCamera.fy) +
@@ -142,8 +136,6 @@ TEST(Window, KeepsWhatMarginalisedPointsSaid) {
   Window window = Disturbed({1, 1, 1}, 0.005);
   WindowOptimizer optimizer(kCamera, {.max_iterations = 20}, 1);
   optimizer.Anchor(*window[0]);
-  window[0]->in_prior = true;
-  window[0]->linearization = window[0]->T_cam_world;
   for (int round = 0; round < 3; ++round) optimizer.Refine(window, false);
   const double information = optimizer.prior().H().trace();
   std::vector<std::pair<int, const ActivePoint*>> leaving;

@@ -62,6 +62,7 @@ TEST_F(DsoCalibration, CameraIsReadInAllItsForms) {
   EXPECT_EQ(fisheye.cy, 239.5);
   EXPECT_EQ(fisheye.omega, 0.9);
   EXPECT_EQ(camera("FOV 300 310 320 240 0.9\n640 480\n").cx, 320);
+  EXPECT_EQ(camera("Pinhole 1.25 1.9 0.5 0.5 0\n640 480\n").fy, 912) << "a long lens";
   EXPECT_FALSE(camera("Pinhole 300 310 320 240 0\n640 480\n").distorted());
   const Camera radtan = camera("RadTan 300 310 320 240 -0.2 0.1 0.01 0.02\n640 480\n");
   EXPECT_EQ(radtan.k1, -0.2);
@@ -72,7 +73,7 @@ TEST_F(DsoCalibration, CameraReportsWhatIsWrong) {
   const auto message = [&](const std::string& text) {
     return ErrorMessage([&] { ReadCameraTxt(dir_.Write("camera.txt", text)); });
   };
-  EXPECT_THAT(message(""), HasSubstr("camera.txt:1: FOV has 0 numbers, expected 5"));
+  EXPECT_THAT(message(""), HasSubstr("camera.txt:1: camera model '' is unknown"));
   EXPECT_THAT(message("1 2 3 4\n640 480"), HasSubstr("FOV has 4 numbers, expected 5"));
   EXPECT_THAT(message("EquiDistant 1 2 3 4 0 0 0 0\n640 480"), HasSubstr("is unknown"));
   EXPECT_THAT(message("300 300 x 240 0\n640 480"), HasSubstr("is no number"));

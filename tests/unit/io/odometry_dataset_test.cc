@@ -316,7 +316,7 @@ class TumMono : public ::testing::Test {
  protected:
   TumMono() {
     for (const char* name : {"00000", "00001", "00002"})
-      WriteImage(folder_ / "images" / (std::string(name) + ".png"));
+      WriteImage(dir_.File(std::string("mono/images/") + name + ".png"));
     dir_.Write("mono/camera.txt", "0.5 0.75 0.5 0.5 0.9\n6 4\ncrop\n6 4\n");
   }
 

@@ -198,6 +198,24 @@ TEST(Undistorter, ShowsRaysWhereTheIdealCameraHasThem) {
       EXPECT_NEAR(shown(y, x), ideal.Unproject({x, y}).x(), 2e-4) << x << ", " << y;
 }
 
+TEST(Undistorter, TakesAFisheyeLensThatSeesSideways) {
+  // The wide lens of TUM's monocular benchmark: its corners are more than 90 degrees off the axis.
+  const Camera raw{.width = 640,
+                   .height = 512,
+                   .fx = 0.349153 * 640,
+                   .fy = 0.436593 * 512,
+                   .cx = 0.493140 * 640 - 0.5,
+                   .cy = 0.499021 * 512 - 0.5,
+                   .omega = 0.933271};
+  EXPECT_FALSE(raw.TryUnproject({0, 0}));
+  const Undistorter undistorter(raw);
+  const Camera& ideal = undistorter.camera();
+  for (const auto& corner : {Eigen::Vector2d(0, 0), Eigen::Vector2d(639, 511)}) {
+    const Eigen::Vector2d from = raw.Project(ideal.Unproject(corner));
+    EXPECT_TRUE(from.x() > -0.5 && from.y() > -0.5 && from.x() < 639.5 && from.y() < 511.5);
+  }
+}
+
 TEST(Undistorter, KeepsAnIdealCamera) {
   const Camera ideal = PinholeRig().left;
   const Undistorter undistorter(ideal);
