@@ -46,7 +46,8 @@ def shorten_odometry(file):
         del study["sequences"][name]
     study |= {"runs": 1, "compared": ["sgf"], "baselines": ["photo"]}
     study["columns"] = {name: study["columns"][name] for name in ("sgf", "photo")}
-    file.write_text(yaml.safe_dump(study, sort_keys=False))
+    title = study.pop("title")  # reproduce.sh reads it in double quotes
+    file.write_text(f'title: "{title}"\n{yaml.safe_dump(study, sort_keys=False)}')
 
 
 class Project:
