@@ -561,7 +561,8 @@ class WindowOptimizer::Engine {
     std::vector<float> all;
     for (size_t k = 0; k < norms.size(); ++k)
       all.insert(all.end(), norms[k].begin(), norms[k].begin() + counts[k]);
-    scale_ = alignment::MedianScale(std::span(all), patches_->dim());
+    scale_ = std::max<double>(alignment::MedianScale(std::span(all), patches_->dim()),
+                              patches_->least_scale());
     pairs_.clear();
   }
 

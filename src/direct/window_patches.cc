@@ -114,6 +114,11 @@ class WindowPatchesOf : public WindowPatches {
   }
 
   int dim() const override { return kDim; }
+  double least_scale() const override {
+    constexpr double kRounding = 0.3;        // grey levels: 1 / sqrt(12)
+    constexpr double kDimensionless = 1e-3;  // of residuals that are about 1 where nothing fits
+    return kBrightness ? kRounding : kDimensionless;
+  }
   bool has_brightness() const override { return kBrightness; }
 
  private:

@@ -63,6 +63,9 @@ class WindowPatches {
   /// Components of a pixel's residual.
   virtual int dim() const = 0;
 
+  /// The least scale of residuals: what rounding to grey levels leaves in images without any noise.
+  virtual double least_scale() const = 0;
+
   /// Whether it depends on the brightness.
   virtual bool has_brightness() const = 0;
 };

@@ -8,7 +8,7 @@ from PIL import Image
 
 from test_tools import fails, run
 
-FRAMES, WIDTH, HEIGHT, STEP_PX = 30, 320, 240, 3
+FRAMES, WIDTH, HEIGHT, STEP_PX = 40, 320, 240, 1
 
 
 @pytest.fixture(scope="module")
@@ -48,8 +48,9 @@ def test_tracks_one_camera(sequence, tmp_path):
     summary = json.loads((out / "summary.json").read_text())
     assert summary["frames"] == summary["posed"] == FRAMES and summary["segments"] == 1
     events = [json.loads(line) for line in (out / "events.jsonl").read_text().splitlines()]
-    assert events[0]["event"] == "map" and events[1]["event"] == "keyframe"
-    assert sum(event["event"] == "keyframe" for event in events) == summary["keyframes"]
+    assert [event["event"] for event in events[:2]] == ["map", "keyframe"]
+    # A map begins with two key-frames.
+    assert sum(event["event"] in ("map", "keyframe") for event in events) == summary["keyframes"]
     header, _, body = (out / "points.ply").read_bytes().partition(b"end_header\n")
     assert f"element vertex {summary['points']}".encode() in header
     assert len(body) == summary["points"] * (4 * 4 + 3 + 4)
@@ -86,7 +87,7 @@ def test_needs_depth_or_a_second_camera_for_alignment(sequence, tmp_path):
 def test_online_poses_are_those_of_tracked_frames(sequence, tmp_path):
     assert run("sgf_direct", sequence, "-o", tmp_path, "--preset", "fast").returncode == 0
     states = [line.split(",")[1] for line in (tmp_path / "frames.csv").read_text().splitlines()[1:]]
-    online = (tmp_path / "trajectory_online.txt").read_text().splitlines()
+    online = np.loadtxt(tmp_path / "trajectory_online.txt")
     assert len(online) == states.count("tracked") < FRAMES
 
 
