@@ -437,14 +437,16 @@ void DirectAligner::MakePyramid(const cv::Mat& grey, Pyramid& pyramid) const {
   while (levels < options_.levels &&
          (std::min(grey.cols, grey.rows) >> levels) >= options_.smallest_side_px)
     ++levels;
-  const std::vector<cv::Mat1f> greys = GreyPyramid(grey, levels);
+  static thread_local std::vector<cv::Mat1f> greys;  // memory is used again
+  GreyPyramid(grey, levels, greys);
   const bool bit_planes = options_.residual == "bit_planes";
   pyramid.samples.resize(bit_planes ? 1 : levels);
   pyramid.bit_planes.resize(bit_planes ? levels : 0);
   for (size_t l = 0; l < pyramid.samples.size(); ++l)
-    MakeSampleChannels(greys[l], options_.image, pyramid.samples[l]);
+    MakeSampleChannels(greys[l], options_.image, pyramid.samples[l], options_.threads);
   for (size_t l = 0; l < pyramid.bit_planes.size(); ++l)
     MakeBitPlanes(greys[l], pyramid.bit_planes[l]);
+  if (greys[0].data == grey.data) greys[0].release();  // the caller's own
 }
 
 Pyramid DirectAligner::MakePyramid(const cv::Mat& grey) const {

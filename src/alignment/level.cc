@@ -1,24 +1,49 @@
 #include <algorithm>
 #include <array>
+#include <numeric>
 
 #include <opencv2/imgproc.hpp>
 
 #include <sgf/alignment/level.h>
+#include <sgf/alignment/sample_rows.h>
+#include <sgf/core/parallel.h>
 
 namespace sgf::alignment {
 
-void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples) {
-  static thread_local GradientImage memory;  // of the largest image so far, used again
-  if (memory.x.rows < grey.rows || memory.x.cols < grey.cols)
-    for (cv::Mat1f* plane : {&memory.x, &memory.y})
-      plane->create(std::max(plane->rows, grey.rows), std::max(plane->cols, grey.cols));
-  const cv::Rect whole({}, grey.size());
-  GradientImage gradient{memory.x(whole), memory.y(whole)};
-  ComputeGradient(grey, options.gradient, gradient);
-  const cv::Mat1f epsilon = metrics::ComputeEpsilon(gradient, options.epsilon);
-  cv::Mat1f intensity = grey;  // converts where it is not float
-  const cv::Mat planes[] = {intensity, gradient.x, gradient.y, epsilon};
-  samples.Assign(planes);
+namespace {
+
+internal::GreyRows RowsAround(const cv::Mat1f& image, int y) {
+  return {image[std::max(y - 1, 0)], image[y], image[std::min(y + 1, image.rows - 1)], image.cols};
+}
+
+/// The paper's epsilon (eq. 6) of a whole image, rows added up in order.
+float ImageEpsilon(const cv::Mat1f& image, const LevelOptions& options, int threads) {
+  std::vector<double> sums(image.rows);
+  ParallelForBatches(image.rows, threads, [&](int y) {
+    sums[y] = internal::SumSquaredGradient(RowsAround(image, y), options.gradient);
+  });
+  const double sum = std::accumulate(sums.begin(), sums.end(), 0.);
+  return static_cast<float>(sum / static_cast<double>(image.total()) + options.epsilon.noise_floor);
+}
+
+}  // namespace
+
+void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples,
+                        int threads) {
+  RequireGreyImage(grey, "image");
+  metrics::CheckOptions(options.epsilon);
+  const cv::Mat1f image = grey;  // converts where it is not float
+  cv::Mat1f epsilon;             // of each pixel, or one for all
+  if (options.epsilon.scope == metrics::EpsilonScope::kImage)
+    epsilon = cv::Mat1f(1, 1, ImageEpsilon(image, options, threads));
+  else
+    epsilon = metrics::ComputeEpsilon(ComputeGradient(image, options.gradient), options.epsilon);
+  samples.Create(image.rows, image.cols);
+  ParallelForBatches(image.rows, threads, [&](int y) {
+    internal::MakeSampleRow(RowsAround(image, y), options.gradient,
+                            {epsilon[std::min(y, epsilon.rows - 1)], size_t(epsilon.cols)},
+                            samples.Row(y));
+  });
 }
 
 SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options) {
@@ -46,17 +71,23 @@ void MakeBitPlanes(const cv::Mat& grey, BitPlanes& planes) {
   planes.Assign(smoothed);
 }
 
-std::vector<cv::Mat1f> GreyPyramid(const cv::Mat& grey, int levels) {
+void GreyPyramid(const cv::Mat& grey, int levels, std::vector<cv::Mat1f>& pyramid) {
   RequireGreyImage(grey, "image");
-  std::vector<cv::Mat1f> pyramid(1);
-  grey.convertTo(pyramid[0], CV_32F);
+  pyramid.resize(levels);
+  if (grey.depth() == CV_32F)
+    pyramid[0] = grey;
+  else
+    grey.convertTo(pyramid[0], CV_32F);
   for (int level = 1; level < levels; ++level) {
-    const cv::Mat1f& fine = pyramid.back();
+    const cv::Mat1f& fine = pyramid[level - 1];
     const cv::Size half(fine.cols / 2, fine.rows / 2);
-    cv::Mat1f coarse;
-    cv::resize(fine(cv::Rect({}, half * 2)), coarse, half, 0, 0, cv::INTER_AREA);
-    pyramid.push_back(coarse);
+    cv::resize(fine(cv::Rect({}, half * 2)), pyramid[level], half, 0, 0, cv::INTER_AREA);
   }
+}
+
+std::vector<cv::Mat1f> GreyPyramid(const cv::Mat& grey, int levels) {
+  std::vector<cv::Mat1f> pyramid;
+  GreyPyramid(grey, levels, pyramid);
   return pyramid;
 }
 

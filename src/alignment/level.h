@@ -37,11 +37,18 @@ class ChannelImage {
   /// Sets all pixels; memory of the right size is used again.
   /// @param planes N images of one size and type CV_32F: the channels.
   void Assign(std::span<const cv::Mat> planes) {
+    Create(planes[0].rows, planes[0].cols);
     cv::merge(planes.data(), planes.size(), data_);
-    rows_ = data_.rows;
-    cols_ = data_.cols;
+  }
+
+  /// Makes room for an image; memory of the right size is used again.
+  void Create(int rows, int cols) {
+    data_.create(rows, cols, CV_32FC(N));
+    rows_ = rows;
+    cols_ = cols;
     pixels_ = data_.template ptr<float>();
   }
+  float* Row(int y) { return data_.template ptr<float>(y); }
 
   int rows() const { return rows_; }
   int cols() const { return cols_; }
@@ -61,23 +68,6 @@ class ChannelImage {
     __builtin_prefetch(upper + size_t(cols_) * N);
   }
 
-  /// Channels at a place that is Inside(), without their derivatives.
-  template <class T>
-  SGF_ALWAYS_INLINE Eigen::Array<T, N, 1> Value(const Eigen::Matrix<T, 2, 1>& p) const {
-    using Pixel = Eigen::Map<const Eigen::Array<float, N, 1>>;
-    const int x = static_cast<int>(p.x());
-    const int y = static_cast<int>(p.y());
-    const T fx = p.x() - T(x);
-    const T fy = p.y() - T(y);
-    const float* upper = At(y, x);
-    const float* lower = upper + size_t(cols_) * N;
-    const Eigen::Array<T, N, 1> a = Pixel(upper).template cast<T>();
-    const Eigen::Array<T, N, 1> c = Pixel(lower).template cast<T>();
-    const Eigen::Array<T, N, 1> top = a + fx * (Pixel(upper + N).template cast<T>() - a);
-    const Eigen::Array<T, N, 1> bottom = c + fx * (Pixel(lower + N).template cast<T>() - c);
-    return top + fy * (bottom - top);
-  }
-
   /// Channels at a place that is Inside().
   template <class T>
   SGF_ALWAYS_INLINE ChannelsAt<T, N> Sample(const Eigen::Matrix<T, 2, 1>& p) const {
@@ -95,6 +85,12 @@ class ChannelImage {
     const Eigen::Array<T, N, 1> top = a + fx * (b - a);
     const Eigen::Array<T, N, 1> bottom = c + fx * (d - c);
     return {top + fy * (bottom - top), (b - a) + fy * ((d - c) - (b - a)), bottom - top};
+  }
+
+  /// The same without their derivatives, which are not computed then.
+  template <class T>
+  SGF_ALWAYS_INLINE Eigen::Array<T, N, 1> Value(const Eigen::Matrix<T, 2, 1>& p) const {
+    return Sample(p).value;
   }
 
  private:
@@ -132,16 +128,22 @@ SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& optio
 
 /// The same into samples whose memory is used again where it has the size: fresh memory takes
 /// longer than the arithmetic.
-void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples);
+/// @param threads 0 for all cores. The result does not depend on it.
+void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples,
+                        int threads = 1);
 
 /// Bit-planes of a grey image, smoothed before and after binarisation (standard deviations 0.75 and
 /// 1.5 px, the values that Alismail et al. recommend for odometry).
 /// @throws Error for an image that cannot be worked on.
 void MakeBitPlanes(const cv::Mat& grey, BitPlanes& planes);
 
-/// Grey images of half the size each, as float; the first has full size. Pixels are means of 2 x 2;
-/// the last row or column of an odd size is dropped.
+/// Grey images of half the size each, as float; the first has full size, and is the image itself
+/// where that is of floats. Pixels are means of 2 x 2; the last row or column of an odd size is
+/// dropped.
 std::vector<cv::Mat1f> GreyPyramid(const cv::Mat& grey, int levels);
+
+/// The same into a pyramid whose memory is used again.
+void GreyPyramid(const cv::Mat& grey, int levels, std::vector<cv::Mat1f>& pyramid);
 
 /// Camera whose image is level `level` of GreyPyramid().
 Camera LevelCamera(const Camera& camera, int level);

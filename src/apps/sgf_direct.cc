@@ -128,7 +128,7 @@ class FrameSource {
   odometry::Undistorter undistorter_;
 };
 
-/// A line of JSON for everything that happens to the map.
+/// A line of JSON for everything that happens to the map, written as it happens.
 class EventLog {
  public:
   explicit EventLog(const fs::path& file) : file_(file) {}
@@ -152,7 +152,7 @@ class EventLog {
   }
 
   /// @throws Error if any line could not be written.
-  void Close() { WriteTextFile(file_, text_); }
+  void Close() { file_.Commit(); }
 
  private:
   void Write(int frame, const direct::DirectFrameResult& result, const char* event,
@@ -162,13 +162,53 @@ class EventLog {
                                    {"event", event},
                                    {"segment", result.segment}};
     if (!more.is_null()) line.update(more);
-    text_ += line.dump() + "\n";
+    file_.Write(line.dump() + "\n");
   }
 
-  fs::path file_;
-  std::string text_;
+  AtomicFile file_;
   direct::DirectState state_ = direct::DirectState::kInitialising;
   int segment_ = 0;
+};
+
+/// Points of all maps, a file each, written as they come.
+class PointFiles {
+ public:
+  explicit PointFiles(fs::path folder) : folder_(std::move(folder)) {}
+
+  void Add(const std::vector<direct::MapPoint>& points) {
+    for (const direct::MapPoint& point : points) Of(point.segment).Add(ToPly(point));
+  }
+
+  /// Ends the file of a map. @return the number of its points.
+  std::int64_t Close(int segment, const fs::path& name) {
+    PointsPlyWriter& writer = Of(segment);
+    writer.Commit();
+    fs::rename(Temporary(segment), folder_ / name);
+    return writer.count();
+  }
+
+ private:
+  fs::path Temporary(int segment) const {
+    return folder_ / fmt::format("points_segment_{}.ply", segment);
+  }
+
+  PointsPlyWriter& Of(int segment) {
+    return writers_
+        .try_emplace(segment, Temporary(segment),
+                     "x right, y down, z forward of the first key-frame, units of the map; "
+                     "variance: of the inverse depth over its square")
+        .first->second;
+  }
+
+  static PlyPoint ToPly(const direct::MapPoint& point) {
+    const Eigen::Vector3f p = point.position.cast<float>();
+    const double relative =
+        point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
+    return {{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support};
+  }
+
+  fs::path folder_;
+  std::map<int, PointsPlyWriter> writers_;
 };
 
 void Report(ReportClock& clock, size_t done, size_t total,
@@ -184,28 +224,24 @@ void Report(ReportClock& clock, size_t done, size_t total,
 struct Run {
   std::vector<direct::DirectFrameResult> frames;
   std::vector<direct::DirectPose> online, final;
-  std::vector<direct::MapPoint> points;
   Camera camera;  ///< as it was known in the end
 };
 
 Run TrackSequence(FrameSource& source, std::span<const OdometryFrame> frames,
-                  direct::DirectOdometry odometry, EventLog& events) {
+                  direct::DirectOdometry odometry, EventLog& events, PointFiles& points) {
   Run run;
   ReportClock clock;
-  const auto keep = [&](const std::vector<direct::MapPoint>& points) {
-    run.points.insert(run.points.end(), points.begin(), points.end());
-  };
   for (const OdometryFrame& frame : frames) {
     const auto result =
         odometry.Process(frame.time_ns, source.Load(frame), source.ExposureMs(frame));
     run.frames.push_back(result);
     if (result.state == direct::DirectState::kTracked)
       run.online.push_back({frame.time_ns, result.segment, result.T_world_cam});
-    keep(odometry.TakeFinishedPoints());
+    points.Add(odometry.TakeFinishedPoints());
     events(static_cast<int>(run.frames.size()) - 1, result);
     Report(clock, run.frames.size(), frames.size(), result);
   }
-  keep(odometry.ActivePoints());
+  points.Add(odometry.ActivePoints());
   run.final = odometry.Trajectory();
   run.camera = odometry.camera();
   return run;
@@ -249,29 +285,11 @@ void WriteTimings(const fs::path& file, const std::vector<direct::DirectFrameRes
   WriteTextFile(file, text);
 }
 
-/// Points of a map in its world coordinates.
-void WritePoints(const fs::path& file, const std::vector<direct::MapPoint>& points, int segment) {
-  std::vector<PlyPoint> cloud;
-  for (const direct::MapPoint& point : points) {
-    if (point.segment != segment) continue;
-    const Eigen::Vector3f p = point.position.cast<float>();
-    const double relative =
-        point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
-    cloud.push_back(
-        {{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support});
-  }
-  WritePointsPly(
-      file, cloud,
-      "x right, y down, z forward of the first key-frame, units of the map; variance: of "
-      "the inverse depth over its square");
-}
-
-void WriteSummary(const fs::path& file, const FrameSource& source, const Run& run, int segment) {
+void WriteSummary(const fs::path& file, const FrameSource& source, const Run& run, int segment,
+                  std::int64_t points) {
   const auto& frames = run.frames;
   const Camera& c = run.camera;
   const size_t posed = OfSegment(run.final, segment).size();
-  const auto points = std::count_if(run.points.begin(), run.points.end(),
-                                    [&](const auto& p) { return p.segment == segment; });
   int keyframes = 0;
   std::vector<double> total_ms;
   double sum_ms = 0;
@@ -315,22 +333,24 @@ void RunDirect(const Arguments& arguments, const OptionFlags& flags) {
   if (const int skipped = source.sequence().skipped_frames)
     spdlog::warn("left out: {} x frame with a missing file", skipped);
   EventLog events(folder / "events.jsonl");
-  const Run run = TrackSequence(source, frames, std::move(odometry), events);
+  PointFiles points(folder);
+  const Run run = TrackSequence(source, frames, std::move(odometry), events, points);
   std::vector<int> segments = Segments(run.final);
   if (segments.empty()) segments = {0};
+  std::map<int, std::int64_t> counts;
   for (const int segment : segments) {
     const std::string suffix = segment == segments[0] ? "" : fmt::format("_segment_{}", segment);
     WriteTrajectory(folder / fmt::format("trajectory{}.txt", suffix),
                     OfSegment(run.final, segment));
     WriteTrajectory(folder / fmt::format("trajectory_online{}.txt", suffix),
                     OfSegment(run.online, segment));
-    WritePoints(folder / fmt::format("points{}.ply", suffix), run.points, segment);
+    counts[segment] = points.Close(segment, fmt::format("points{}.ply", suffix));
   }
   WriteFrames(folder / "frames.csv", run.frames);
   WriteTimings(folder / "timings.csv", run.frames);
   WriteRunOptions(folder / "options.yaml", WriteOptions(options));
   events.Close();
-  WriteSummary(folder / "summary.json", source, run, segments[0]);
+  WriteSummary(folder / "summary.json", source, run, segments[0], counts[segments[0]]);
 }
 
 }  // namespace

@@ -22,12 +22,16 @@ void RequireGreyImage(const cv::Mat& image, const char* name) {
     throw Error(name, fmt::format("unsupported pixel type {}", cv::typeToString(image.type())));
 }
 
+GradientTaps TapsOf(GradientOperator op) {
+  if (op == GradientOperator::kScharr) return {0.5F, 3 / 16.F, 10 / 16.F};
+  return {0.5F, 0, 1};
+}
+
 void ComputeGradient(const cv::Mat& image, GradientOperator op, GradientImage& gradient) {
   RequireGreyImage(image, "gradient input");
-  const cv::Matx13f derivative(-0.5F, 0, 0.5F);
-  const cv::Matx13f across = op == GradientOperator::kScharr
-                                 ? cv::Matx13f(3 / 16.F, 10 / 16.F, 3 / 16.F)
-                                 : cv::Matx13f(0, 1, 0);
+  const GradientTaps taps = TapsOf(op);
+  const cv::Matx13f derivative(-taps.derivative, 0, taps.derivative);
+  const cv::Matx13f across(taps.across_side, taps.across_centre, taps.across_side);
   const cv::Point centre(-1, -1);
   // Isolated: a part of a larger image is an image of its own.
   constexpr int kBorder = cv::BORDER_REPLICATE | cv::BORDER_ISOLATED;

@@ -15,6 +15,13 @@ enum class GradientOperator {
   kScharr,   ///< [-1 0 1]/2 smoothed by [3 10 3]/16 across
 };
 
+/// An operator as a separable filter: a derivative [-d 0 d] along one axis and [s c s] across it.
+struct GradientTaps {
+  float derivative;
+  float across_side, across_centre;
+};
+GradientTaps TapsOf(GradientOperator op);
+
 /// Names of the operators in options files.
 std::span<const std::pair<const char*, GradientOperator>> EnumNames(GradientOperator);
 

@@ -105,8 +105,9 @@ void CheckOptions(const DirectOptions& options) {
     throw Error("tracking.residual", "'lssd' is constant over patches of one pixel");
   require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
   require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
-  require(options.keyframes >= options.min_keyframes && options.keyframes <= 30, "keyframes",
-          options.keyframes, "from min_keyframes to 30");
+  require(options.keyframes >= options.min_keyframes && options.keyframes <= kMostKeyframes,
+          "keyframes", options.keyframes,
+          fmt::format("from min_keyframes to {}", kMostKeyframes).c_str());
   require(options.keyframe_flow > 0, "keyframe_flow", options.keyframe_flow, "positive");
   require(options.keyframe_parallax > 0, "keyframe_parallax", options.keyframe_parallax,
           "positive");
@@ -137,7 +138,7 @@ class DirectOdometry::Impl {
     last_time_ns_ = time_ns;
     DirectFrameResult result{.time_ns = time_ns, .segment = segment_};
     Stopwatch total, stage;
-    const cv::Mat1f image = grey;  // converts where it is not float
+    const cv::Mat1f image = AsFloat(grey);
     log_exposure_ = exposure_ms ? std::log(*exposure_ms / *first_exposure_ms_) : 0;
     if (!initializer_) {
       aligner_.MakePyramid(image, pyramid_);
@@ -196,6 +197,13 @@ class DirectOdometry::Impl {
     double log_exposure = 0;
   };
 
+  /// The image itself, or its grey levels as float in memory that is used again.
+  cv::Mat1f AsFloat(const cv::Mat& grey) {
+    if (grey.depth() == CV_32F) return grey;
+    grey.convertTo(float_image_, CV_32F);
+    return float_image_;
+  }
+
   static DirectOptions WithThreads(DirectOptions options) {
     options.tracking.threads = options.threads;
     return options;
@@ -208,6 +216,8 @@ class DirectOdometry::Impl {
     if (grey.cols != camera_.width || grey.rows != camera_.height)
       throw Error("image", fmt::format("is {}x{} px; the camera has {}x{}", grey.cols, grey.rows,
                                        camera_.width, camera_.height));
+    if (grey.depth() == CV_32F && !cv::checkRange(grey))
+      throw Error("image", "has grey levels that are not finite");
     if (last_time_ns_ && time_ns <= *last_time_ns_)
       throw Error("frame", fmt::format("time {} ns is not after the last one's, {} ns", time_ns,
                                        *last_time_ns_));
@@ -387,9 +397,7 @@ class DirectOdometry::Impl {
       const auto aligned = aligner_.Align(*reference_, pyramid_, hypothesis * T_last_ref);
       ++result.hypotheses;
       if (aligned.ok() && (!best.ok() || aligned.mean_cost < best.mean_cost)) best = aligned;
-      // As good as the last frame: no need to look further.
-      constexpr double kAlike = 1.5;
-      if (best.ok() && (best.mean_cost < kAlike * last_cost_ || result.hypotheses >= 4)) break;
+      if (best.ok() && (LikeTheLast(best) || result.hypotheses >= 4)) break;
     }
     result.inlier_share = best.inlier_share;
     result.overlap = best.overlap;
@@ -400,11 +408,20 @@ class DirectOdometry::Impl {
     }
     lost_ = 0;
     last_cost_ = best.mean_cost;
+    last_inlier_share_ = best.inlier_share;
     result.state = DirectState::kTracked;
     brightness_ = BrightnessNow(best);
     result.brightness = brightness_;
     T_cur_ref_ = best.T_cur_ref;
     Believe(result.time_ns, reference_id_, best.T_cur_ref);
+  }
+
+  /// As good as the last frame, so that there is no need to look further. Costs rise with the
+  /// distance from the key-frame; inliers do not mind.
+  bool LikeTheLast(const alignment::AlignmentResult& aligned) const {
+    constexpr double kAlike = 1.5, kFewerInliers = 0.03;
+    return aligned.mean_cost < kAlike * last_cost_ ||
+           aligned.inlier_share > last_inlier_share_ - kFewerInliers;
   }
 
   /// Of the frame at hand; where motion is estimated without it, as exposures or means say.
@@ -467,6 +484,7 @@ class DirectOdometry::Impl {
     reference_ = aligner_.MakeReference(newest.pyramid, reference_points_);
     reference_id_ = newest.id;
     last_cost_ = INFINITY;
+    last_inlier_share_ = 0;
   }
 
   // --- Key-frames ---
@@ -722,7 +740,9 @@ class DirectOdometry::Impl {
   std::shared_ptr<const alignment::DirectAligner::Reference> reference_;
   int reference_id_ = 0;
   double last_cost_ = INFINITY;
+  double last_inlier_share_ = 0;
 
+  cv::Mat1f float_image_;
   alignment::Pyramid pyramid_;  ///< of the frame at hand
   alignment::Pyramid spare_;    ///< memory of a key-frame that has left
   SE3 T_cur_ref_;

@@ -13,7 +13,8 @@
 /// What direct odometry keeps of a key-frame.
 namespace sgf::direct {
 
-inline constexpr int kPatchPixels = 8;  ///< of alignment::Pattern::kDso8
+inline constexpr int kMostKeyframes = 30;  ///< of a window, but for one that is about to leave
+inline constexpr int kPatchPixels = 8;     ///< of alignment::Pattern::kDso8
 
 /// Brightness of an image of radiance L: I = exp(a) L + b, in grey levels. With known exposure
 /// times a begins at their logarithm.

@@ -128,7 +128,10 @@ class DepthEstimatorOf : public DepthEstimator {
     Vector3f p;
   };
 
-  alignment::SolverOptions Solver() const { return {.max_iterations = options_.max_iterations}; }
+  /// A hundredth of the cost is far less than what noise moves a point by.
+  alignment::SolverOptions Solver() const {
+    return {.max_iterations = options_.max_iterations, .tolerance = 1e-2};
+  }
 
   bool MakePatchOf(const SampleChannels& image, const Vector2f& pixel,
                    const RelativeBrightness& relative, Patch& patch) const {
@@ -192,10 +195,12 @@ class DepthEstimatorOf : public DepthEstimator {
   }
 
   /// Dissimilarity of a patch whose pixels lie at these offsets from a place; infinite out of view.
+  /// What is above `enough` need not be the whole sum.
   float Cost(const SampleChannels& image, const Patch& patch, const Vector2f& place,
-             const std::array<Vector2f, kPatchPixels>& shape, const Matrix2f& A) const {
+             const std::array<Vector2f, kPatchPixels>& shape, const Matrix2f& A,
+             float enough) const {
     float cost = 0;
-    for (int k = 0; k < kPatchPixels; ++k) {
+    for (int k = 0; k < kPatchPixels && cost <= enough; ++k) {
       const Vector2f pixel = place + shape[k];
       if (!image.Inside(pixel)) return kInfinite;
       cost +=
@@ -215,8 +220,12 @@ class DepthEstimatorOf : public DepthEstimator {
     const auto offsets = alignment::Offsets(alignment::Pattern::kDso8);
     for (int k = 0; k < kPatchPixels; ++k) shape[k] = line.A * offsets[k];
     const Vector2f step = stride * line.direction;
-    for (int k = 0; k < steps; ++k)
-      costs[k] = Cost(image, patch, line.from + static_cast<float>(k) * step, shape, line.A);
+    // Costs only have to be told apart up to where the best one is unambiguous.
+    float enough = kInfinite;
+    for (int k = 0; k < steps; ++k) {
+      costs[k] = Cost(image, patch, line.from + static_cast<float>(k) * step, shape, line.A, enough);
+      enough = std::min(enough, static_cast<float>(options_.min_quality) * costs[k]);
+    }
     const int best =
         static_cast<int>(std::min_element(costs.begin(), costs.begin() + steps) - costs.begin());
     if (!(costs[best] < kInfinite)) {

@@ -11,6 +11,7 @@
 #include <sgf/alignment/patch_alignment.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/direct/prior_costs.h>
 #include <sgf/direct/window.h>
 #include <sgf/direct/window_patches.h>
 
@@ -21,10 +22,6 @@ using Eigen::MatrixXd, Eigen::VectorXd;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 constexpr double kHeld = 1e9;  // information of a parameter that is held
-
-/// The camera takes a key-frame's place among the parameters, after all of them: fx, fy, cx, cy as
-/// differences from where it was linearised, and four without a meaning.
-constexpr int kCameraId = -1, kIntrinsics = 4;
 
 /// Normal equations in the parameters of all key-frames, inverse depths eliminated.
 struct Reduced {
@@ -59,87 +56,6 @@ void SetParameters(const FrameParameters& x, Keyframe& frame) {
   frame.brightness = {frame.brightness_linearization.a + x(6),
                       frame.brightness_linearization.b + x(7)};
 }
-
-/// @return fx, fy, cx, cy, px.
-std::array<double*, kIntrinsics> IntrinsicsOf(Camera& camera) {
-  return {&camera.fx, &camera.fy, &camera.cx, &camera.cy};
-}
-
-/// What is known of the camera beforehand.
-class CameraCost : public ceres::SizedCostFunction<kFrameParameters, kFrameParameters> {
- public:
-  CameraCost(Camera linearization, Camera expected, double sigma_px) : sigma_px_(sigma_px) {
-    offset_.setZero();
-    for (int k = 0; k < kIntrinsics; ++k)
-      offset_(k) = *IntrinsicsOf(linearization)[k] - *IntrinsicsOf(expected)[k];
-  }
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    Eigen::Map<FrameParameters> r(residuals);
-    r = (offset_ + Eigen::Map<const FrameParameters>(parameters[0])) / sigma_px_;
-    using Block = Eigen::Matrix<double, kFrameParameters, kFrameParameters>;
-    if (jacobians && jacobians[0]) {
-      Eigen::Map<Block> J(jacobians[0]);
-      J = Block::Identity() / sigma_px_;
-    }
-    return true;
-  }
-
- private:
-  double sigma_px_;
-  FrameParameters offset_;
-};
-
-/// What is known of a brightness beforehand.
-struct BrightnessBelief {
-  Eigen::Vector2d sigma;
-  Eigen::Vector2d offset;  ///< of the linearisation from what is expected
-};
-
-class BrightnessCost : public ceres::SizedCostFunction<2, kFrameParameters> {
- public:
-  explicit BrightnessCost(const BrightnessBelief& belief)
-      : sigma_(belief.sigma), offset_(belief.offset) {}
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    for (int k = 0; k < 2; ++k) {
-      residuals[k] = (offset_(k) + parameters[0][6 + k]) / sigma_(k);
-      if (!jacobians || !jacobians[0]) continue;
-      double* row = jacobians[0] + k * kFrameParameters;
-      std::fill(row, row + kFrameParameters, 0.);
-      row[6 + k] = 1 / sigma_(k);
-    }
-    return true;
-  }
-
- private:
-  Eigen::Vector2d sigma_, offset_;
-};
-
-/// The prior as a cost: |S x + e|^2 / 2.
-class PriorCost : public ceres::CostFunction {
- public:
-  explicit PriorCost(const Prior& prior) : root_(SquareRootOf(prior.H(), prior.b())) {
-    set_num_residuals(static_cast<int>(root_.e.size()));
-    mutable_parameter_block_sizes()->assign(prior.frames().size(), kFrameParameters);
-  }
-  bool Evaluate(double const* const* parameters, double* residuals,
-                double** jacobians) const override {
-    Eigen::Map<VectorXd> r(residuals, root_.e.size());
-    r = root_.e;
-    for (size_t k = 0; k < parameter_block_sizes().size(); ++k) {
-      const auto S =
-          root_.S.middleCols<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
-      r += S * Eigen::Map<const FrameParameters>(parameters[k]);
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
-      if (jacobians && jacobians[k]) Eigen::Map<RowMajor>(jacobians[k], S.rows(), S.cols()) = S;
-    }
-    return true;
-  }
-
- private:
-  SquareRoot root_;
-};
 
 }  // namespace
 
@@ -271,6 +187,16 @@ class WindowOptimizer::Engine {
     if (refines_camera_) ids.push_back(kCameraId);
     // The prior's parameters count from the linearisation, those here from where it is now.
     prior.Add(ids, reduced.H, reduced.b - reduced.H * x_);
+  }
+
+  /// Adds what is known of a key-frame's brightness beforehand.
+  void AddBrightness(const Keyframe& frame, bool exposures_known, Prior& prior) const {
+    const BrightnessBelief belief = BrightnessKnown(frame, exposures_known);
+    const Eigen::Array2d weight = belief.sigma.array().square().inverse();
+    FrameParameters H = FrameParameters::Zero(), b = H;
+    H.tail<2>() = weight;
+    b.tail<2>() = weight * belief.offset.array();
+    prior.Add({frame.id}, H.asDiagonal().toDenseMatrix(), b);
   }
 
  private:
@@ -518,8 +444,9 @@ class WindowOptimizer::Engine {
   void SubtractDepth(const Window& window, const Point& point, Reduced& part) const {
     if (!(point.information > 0)) return;
     constexpr int n = kFrameParameters;
-    std::array<int, 33> blocks;
-    std::array<FrameParameters, 33> across;
+    constexpr size_t kMostBlocks = kMostKeyframes + 2;  // the newest and the camera as well
+    std::array<int, kMostBlocks> blocks;
+    std::array<FrameParameters, kMostBlocks> across;
     int count = 1;
     blocks[0] = point.host;
     across[0].setZero();
@@ -585,7 +512,7 @@ class WindowOptimizer::Engine {
     }
     CameraCost camera_cost(camera_linearization_, given_camera_, options_.sigma_intrinsics);
     if (refines_camera_) problem.AddResidualBlock(&camera_cost, nullptr, blocks.back());
-    const PriorCost prior_cost(prior);
+    PriorCost prior_cost(prior);
     std::vector<double*> prior_blocks;
     for (int id : prior.frames()) {
       if (id == kCameraId) prior_blocks.push_back(blocks.back());
@@ -593,7 +520,7 @@ class WindowOptimizer::Engine {
         if (window[k]->id == id) prior_blocks.push_back(blocks[k]);
     }
     if (prior_cost.num_residuals() > 0)
-      problem.AddResidualBlock(const_cast<PriorCost*>(&prior_cost), nullptr, prior_blocks);
+      problem.AddResidualBlock(&prior_cost, nullptr, prior_blocks);
 
     const VectorXd before = x_;
     ceres::Solver::Options options;
@@ -628,18 +555,6 @@ class WindowOptimizer::Engine {
     return near(fx, given_camera_.fx) && near(fy, given_camera_.fy);
   }
 
- public:
-  /// Adds what is known of a key-frame's brightness beforehand.
-  void AddBrightness(const Keyframe& frame, bool exposures_known, Prior& prior) const {
-    const BrightnessBelief belief = BrightnessKnown(frame, exposures_known);
-    const Eigen::Array2d weight = belief.sigma.array().square().inverse();
-    FrameParameters H = FrameParameters::Zero(), b = H;
-    H.tail<2>() = weight;
-    b.tail<2>() = weight * belief.offset.array();
-    prior.Add({frame.id}, H.asDiagonal().toDenseMatrix(), b);
-  }
-
- private:
   BrightnessBelief BrightnessKnown(const Keyframe& frame, bool exposures_known) const {
     const Eigen::Vector2d sigma =
         exposures_known ? Eigen::Vector2d(options_.sigma_a_known, options_.sigma_b_known)

@@ -47,6 +47,18 @@ void AtomicFile::Write(std::string_view bytes) {
   }
 }
 
+void AtomicFile::Overwrite(std::int64_t offset, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = pwrite(descriptor_, bytes.data(), bytes.size(), offset);
+    if (written >= 0) {
+      bytes.remove_prefix(static_cast<size_t>(written));
+      offset += written;
+    } else if (errno != EINTR) {
+      Fail("cannot be written", errno);
+    }
+  }
+}
+
 void AtomicFile::Commit() {
   Close();
   std::error_code error;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string_view>
 
@@ -26,6 +27,9 @@ class AtomicFile {
 
   /// Appends bytes. @throws Error naming the target when they cannot be written (disk full).
   void Write(std::string_view bytes);
+
+  /// Writes over bytes from `offset` on that were written before. @throws Error as Write().
+  void Overwrite(std::int64_t offset, std::string_view bytes);
 
   /// Closes the file and gives it its name; to be called once, as the last call.
   /// @throws Error naming the target when that fails; the temporary file is then removed.

@@ -74,11 +74,15 @@ void PairImages(const std::vector<EurocImage>& left, const std::vector<EurocImag
 
 void OpenEuroc(const fs::path& folder, OdometrySequence& sequence) {
   EurocSequence euroc = ReadEuroc(folder, EurocFiles::kMayBeMissing);
-  if (euroc.images.size() != 2)
+  if (euroc.images.empty() || euroc.images.size() > 2)
     throw Error(folder.string(),
-                fmt::format("has {} camera(s), expected a stereo pair", euroc.images.size()));
+                fmt::format("has {} camera(s), expected one or two", euroc.images.size()));
   sequence.cameras = euroc.sensors.cameras;
-  PairImages(euroc.images[0], euroc.images[1], sequence);
+  if (euroc.images.size() == 2)
+    PairImages(euroc.images[0], euroc.images[1], sequence);
+  else
+    for (const EurocImage& image : euroc.images[0])
+      AppendFrame(sequence, {image.time_ns, image.file, {}, {}});
   sequence.imu = std::move(euroc.imu);
   for (const BodyState& state : euroc.truth)
     sequence.truth.push_back({state.time_ns, state.T_world_body});
@@ -314,6 +318,7 @@ void OpenTumMono(const fs::path& folder, OdometrySequence& sequence) {
   sensor.camera = ReadCameraTxt(folder / "camera.txt");
   sensor.rate_hz = 30;
   sequence.cameras = {sensor};
+  if (!IsFolder(folder / "images")) throw Error((folder / "images").string(), "is no folder");
   const std::vector<fs::path> images = ImagesIn(folder / "images");
   if (IsFile(folder / "times.txt")) {
     std::map<std::string, fs::path> by_name;

@@ -21,6 +21,7 @@ constexpr std::string_view kPoint =
     "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int support\n"
     "end_header\n";
 constexpr size_t kPointBytes = 4 * 4 + 3 + 4;
+constexpr int kCountDigits = 10;  // room for a number that is known in the end
 
 void AppendLittleEndian(std::string& bytes, uint32_t word) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 0xFF);
@@ -64,25 +65,49 @@ void WriteMeshPly(const std::filesystem::path& path, std::span<const cv::Point3f
   WriteTextFile(path, bytes);
 }
 
+PointsPlyWriter::PointsPlyWriter(const std::filesystem::path& path, const std::string& comment)
+    : file_(path) {
+  const std::string begin = fmt::format("{}comment {}\nelement vertex ", kFormat, comment);
+  count_at_ = static_cast<std::int64_t>(begin.size());
+  file_.Write(fmt::format("{}{:{}}\n{}", begin, 0, kCountDigits, kPoint));
+}
+
+void PointsPlyWriter::Add(const PlyPoint& p) {
+  for (const float value : {p.position.x, p.position.y, p.position.z, p.variance})
+    AppendLittleEndian(bytes_, std::bit_cast<uint32_t>(value));
+  const auto grey = static_cast<uint8_t>(std::clamp(p.grey, 0.f, 255.f));
+  bytes_.append(3, static_cast<char>(grey));
+  AppendLittleEndian(bytes_, static_cast<uint32_t>(p.support));
+  ++count_;
+  constexpr size_t kBuffer = size_t{1} << 16;
+  if (bytes_.size() > kBuffer) Flush();
+}
+
+void PointsPlyWriter::Flush() {
+  file_.Write(bytes_);
+  bytes_.clear();
+}
+
+void PointsPlyWriter::Commit() {
+  Flush();
+  file_.Overwrite(count_at_, fmt::format("{:{}}", count_, kCountDigits));
+  file_.Commit();
+}
+
 void WritePointsPly(const std::filesystem::path& path, std::span<const PlyPoint> points,
                     const std::string& comment) {
-  std::string bytes =
-      fmt::format("{}comment {}\nelement vertex {}\n{}", kFormat, comment, points.size(), kPoint);
-  for (const PlyPoint& p : points) {
-    for (const float value : {p.position.x, p.position.y, p.position.z, p.variance})
-      AppendLittleEndian(bytes, std::bit_cast<uint32_t>(value));
-    const auto grey = static_cast<uint8_t>(std::clamp(p.grey, 0.f, 255.f));
-    bytes.append(3, static_cast<char>(grey));
-    AppendLittleEndian(bytes, static_cast<uint32_t>(p.support));
-  }
-  WriteTextFile(path, bytes);
+  PointsPlyWriter writer(path, comment);
+  for (const PlyPoint& point : points) writer.Add(point);
+  writer.Commit();
 }
 
 std::vector<PlyPoint> ReadPointsPly(const std::filesystem::path& path) {
   const std::string data = ReadFile(path);
   std::string_view rest = data;
   const std::string_view begin = TakeUntil("element vertex ", rest, path);
-  const auto count = ParseNumber<int>(TakeUntil("\n", rest, path));
+  std::string_view number = TakeUntil("\n", rest, path);
+  number.remove_prefix(std::min(number.find_first_not_of(' '), number.size()));
+  const auto count = ParseNumber<int>(number);
   if (!begin.starts_with(kFormat) || !rest.starts_with(kPoint) || !count || *count < 0)
     throw Error(path.string(), "is no binary PLY file with x, y, z, variance, colour and support");
   rest.remove_prefix(kPoint.size());

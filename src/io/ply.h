@@ -1,12 +1,15 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <opencv2/core.hpp>
+
+#include <sgf/io/atomic_file.h>
 
 namespace sgf {
 
@@ -25,9 +28,32 @@ struct PlyPoint {
   int support = 0;     ///< how many images it was seen in
 };
 
-/// Writes points as a binary PLY file: x, y, z and variance as float, red, green and blue as bytes,
-/// support as int.
-/// @param comment as for WriteMeshPly().
+/// Writes points as they come as a binary PLY file: x, y, z and variance as float, red, green and
+/// blue as bytes, support as int. Memory does not grow with their number.
+class PointsPlyWriter {
+ public:
+  /// @param comment as for WriteMeshPly().
+  /// @throws Error for a file that cannot be written.
+  PointsPlyWriter(const std::filesystem::path& path, const std::string& comment);
+
+  /// @throws Error for bytes that cannot be written.
+  void Add(const PlyPoint& point);
+
+  /// Gives the file its name; the last call. @throws Error as Add().
+  void Commit();
+
+  std::int64_t count() const { return count_; }
+
+ private:
+  void Flush();
+
+  AtomicFile file_;
+  std::int64_t count_at_;  ///< bytes before the number of points
+  std::int64_t count_ = 0;
+  std::string bytes_;
+};
+
+/// Writes points in one go, as PointsPlyWriter does.
 /// @throws Error for a file that cannot be written.
 void WritePointsPly(const std::filesystem::path& path, std::span<const PlyPoint> points,
                     const std::string& comment);

@@ -13,18 +13,11 @@
 namespace sgf::metrics {
 namespace {
 
-void Validate(const GradientImage& gradient, const EpsilonOptions& options) {
+void CheckPlanes(const GradientImage& gradient) {
   if (gradient.x.empty()) throw Error("gradient", "image is empty");
   if (gradient.x.size() != gradient.y.size())
     throw Error("gradient", fmt::format("planes differ in size: {}x{} and {}x{}", gradient.x.cols,
                                         gradient.x.rows, gradient.y.cols, gradient.y.rows));
-  if (options.tile_px < 1)
-    throw Error("tile_px", fmt::format("must be at least 1, got {}", options.tile_px));
-  if (options.window_px < 1 || options.window_px % 2 == 0)
-    throw Error("window_px", fmt::format("must be odd and positive, got {}", options.window_px));
-  if (!(options.noise_floor >= 0) || std::isinf(options.noise_floor))
-    throw Error("noise_floor",
-                fmt::format("must be finite and not negative, got {}", options.noise_floor));
 }
 
 cv::Mat1f SquaredMagnitude(const GradientImage& gradient) {
@@ -115,8 +108,19 @@ std::span<const std::pair<const char*, EpsilonScope>> EnumNames(EpsilonScope) {
   return kNames;
 }
 
+void CheckOptions(const EpsilonOptions& options) {
+  if (options.tile_px < 1)
+    throw Error("tile_px", fmt::format("must be at least 1, got {}", options.tile_px));
+  if (options.window_px < 1 || options.window_px % 2 == 0)
+    throw Error("window_px", fmt::format("must be odd and positive, got {}", options.window_px));
+  if (!(options.noise_floor >= 0) || std::isinf(options.noise_floor))
+    throw Error("noise_floor",
+                fmt::format("must be finite and not negative, got {}", options.noise_floor));
+}
+
 cv::Mat1f ComputeEpsilon(const GradientImage& gradient, const EpsilonOptions& options) {
-  Validate(gradient, options);
+  CheckPlanes(gradient);
+  CheckOptions(options);
   cv::Mat1f epsilon = MeanSquared(gradient, options);
   if (options.noise_floor > 0) epsilon += options.noise_floor;
   return epsilon;

@@ -37,6 +37,9 @@ struct EpsilonOptions {
   }
 };
 
+/// @throws Error for options that make no sense.
+void CheckOptions(const EpsilonOptions& options);
+
 /// Epsilon of every pixel, (grey levels/px)^2, of the size of the gradient and never negative. It
 /// is 0 only where the scope is entirely flat and there is no noise floor.
 ///

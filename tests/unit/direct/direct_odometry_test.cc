@@ -238,6 +238,7 @@ TEST(DirectOdometry, RefusesBadInputAndGoesOn) {
   EXPECT_THAT(refusal(kPeriod, cv::Mat1b(240, 321)), HasSubstr("321x240"));
   EXPECT_THAT(refusal(kPeriod, cv::Mat1d(240, 320)), HasSubstr("8-bit or float grey"));
   EXPECT_THAT(refusal(kPeriod, {}), HasSubstr("image"));
+  EXPECT_THAT(refusal(kPeriod, cv::Mat1f(240, 320, std::nanf(""))), HasSubstr("not finite"));
   EXPECT_THAT(refusal(kPeriod, Black(), 3.), HasSubstr("some frames only"));
   EXPECT_THAT(refusal(kPeriod, Black(), -3.), HasSubstr("positive"));
   EXPECT_EQ(flight.Fly(1).state, DirectState::kInitialising);

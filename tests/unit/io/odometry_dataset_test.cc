@@ -88,11 +88,17 @@ TEST_F(EurocOdometry, SkipsAndCountsFramesWithOneEye) {
   EXPECT_EQ(sequence.skipped_frames, 5) << "at 5, 20, 30, 40 and 50";
 }
 
-TEST_F(EurocOdometry, ReportsASequenceThatIsNoStereoOne) {
+TEST_F(EurocOdometry, ReportsThatNoFrameHasBothItsFiles) {
   SetImages(1, {11});
   EXPECT_EQ(OpenError(folder_), folder_.string() + ": has no frame with all its files; 4 lack one");
+}
+
+TEST_F(EurocOdometry, MayHaveOneCamera) {
   fs::remove_all(folder_ / "mav0/cam1");
-  EXPECT_EQ(OpenError(folder_), folder_.string() + ": has 1 camera(s), expected a stereo pair");
+  const OdometrySequence sequence = OpenOdometrySequence(folder_);
+  EXPECT_EQ(sequence.cameras.size(), 1U);
+  EXPECT_EQ(sequence.frames.size(), 4U);
+  EXPECT_TRUE(sequence.frames[0].right.empty());
 }
 
 // ---- KITTI
@@ -342,6 +348,12 @@ TEST_F(TumMono, HasImagesTimesAndTruth) {
 TEST_F(TumMono, WithoutTimesHasThirtyImagesASecond) {
   EXPECT_EQ(Times(OpenOdometrySequence(folder_)),
             (std::vector<std::int64_t>{0, 33'333'333, 66'666'666}));
+}
+
+TEST_F(TumMono, NeedsImages) {
+  fs::remove_all(folder_ / "images");
+  EXPECT_THAT(ErrorMessage([&] { OpenOdometrySequence(folder_, OdometryLayout::kTumMono); }),
+              EndsWith("images: is no folder"));
 }
 
 TEST_F(TumMono, LeavesOutTimesWithoutAnImage) {

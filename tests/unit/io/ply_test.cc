@@ -34,6 +34,20 @@ TEST(PointsPly, GivesBackWhatWasWritten) {
   EXPECT_TRUE(ReadPointsPly(file).empty());
 }
 
+TEST(PointsPly, IsWrittenAsPointsCome) {
+  const TempDir dir;
+  const auto file = dir.path() / "points.ply";
+  constexpr int kPoints = 10'000;  // more than are held back
+  PointsPlyWriter writer(file, "units");
+  for (int k = 0; k < kPoints; ++k) writer.Add({{1, 2, 3}, 4, 5, k});
+  EXPECT_FALSE(std::filesystem::exists(file));
+  writer.Commit();
+  EXPECT_EQ(writer.count(), kPoints);
+  const std::vector<PlyPoint> read = ReadPointsPly(file);
+  ASSERT_EQ(read.size(), size_t{kPoints});
+  for (int k = 0; k < kPoints; ++k) ASSERT_EQ(read[k].support, k);
+}
+
 TEST(PointsPly, NamesAFileThatIsAnother) {
   const TempDir dir;
   const auto error = [&](const std::string& text) {
