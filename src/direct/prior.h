@@ -12,16 +12,6 @@ namespace sgf::direct {
 inline constexpr int kFrameParameters = 8;
 using FrameParameters = Eigen::Matrix<double, kFrameParameters, 1>;
 
-/// x^T H x / 2 + b^T x as least squares, |S x + e|^2 / 2 up to a constant: S has a row for each
-/// direction that anything is known of.
-struct SquareRoot {
-  Eigen::MatrixXd S;
-  Eigen::VectorXd e;
-};
-
-/// @param H symmetric, without negative eigenvalues but for rounding.
-SquareRoot SquareRootOf(const Eigen::MatrixXd& H, const Eigen::VectorXd& b);
-
 /// A quadratic x^T H x / 2 + b^T x in the parameters x of key-frames, one after the other.
 class Prior {
  public:

@@ -7,6 +7,7 @@
 #include <ceres/sized_cost_function.h>
 
 #include <sgf/core/camera.h>
+#include <sgf/core/square_root.h>
 #include <sgf/direct/prior.h>
 
 /// What is known of a window before its measurements, as costs for Ceres. All have blocks of

@@ -11,6 +11,7 @@
 #include <sgf/alignment/patch_alignment.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/square_root.h>
 #include <sgf/direct/prior_costs.h>
 #include <sgf/direct/window.h>
 #include <sgf/direct/window_patches.h>

@@ -84,6 +84,7 @@ void OpenEuroc(const fs::path& folder, OdometrySequence& sequence) {
     for (const EurocImage& image : euroc.images[0])
       AppendFrame(sequence, {image.time_ns, image.file, {}, {}});
   sequence.imu = std::move(euroc.imu);
+  sequence.imu_noise = euroc.sensors.imu_noise;
   for (const BodyState& state : euroc.truth)
     sequence.truth.push_back({state.time_ns, state.T_world_body});
 }

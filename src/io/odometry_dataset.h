@@ -58,6 +58,7 @@ struct OdometrySequence {
   std::vector<OdometryFrame> frames;  ///< times increase; never none
   int skipped_frames = 0;             ///< left out since one of their files is missing
   std::vector<ImuSample> imu;         ///< in body coordinates; empty where there is no sensor
+  ImuNoise imu_noise = {};            ///< of that sensor
   std::vector<TimedPose> truth;       ///< T_world_body; empty where there is none
   double depth_levels_per_m = 5000;   ///< of 16-bit depth images
 

@@ -1,0 +1,409 @@
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/core.h>
+
+#include <sgf/core/error.h>
+#include <sgf/core/stopwatch.h>
+#include <sgf/vio/stereo_inertial_odometry.h>
+#include <sgf/vio/triangulation.h>
+
+namespace sgf::vio {
+namespace {
+
+using Eigen::Vector2d, Eigen::Vector3d;
+
+/// So much of a motion, at constant velocity.
+SE3 Part(const SE3& motion, double share) {
+  return {ExpSO3(share * LogSO3(motion.R)), share * motion.p};
+}
+
+ImuBias BiasOf(const BodyState& state) { return {state.gyro_bias, state.accel_bias}; }
+
+}  // namespace
+
+void CheckOptions(const VioOptions& options) {
+  flow::CheckOptions(options.flow);
+  CheckOptions(options.window);
+  const auto require = [](bool valid, const char* option, double value, const char* range) {
+    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
+  };
+  require(options.states >= 2 && options.states <= 10, "states", options.states, "from 2 to 10");
+  require(options.keyframes >= 2 && options.keyframes <= 30, "keyframes", options.keyframes,
+          "from 2 to 30");
+  require(options.keyframe_share > 0 && options.keyframe_share <= 1, "keyframe_share",
+          options.keyframe_share, "in (0, 1]");
+  require(options.keyframe_gap >= 1, "keyframe_gap", options.keyframe_gap, "positive");
+  require(options.least_parallax > 0, "least_parallax", options.least_parallax, "positive");
+  require(options.least_sights >= 3, "least_sights", options.least_sights, "at least 3");
+  require(options.blind_s >= 0, "blind_s", options.blind_s, "at least 0");
+  require(options.gyro_bias_sigma > 0, "gyro_bias_sigma", options.gyro_bias_sigma, "positive");
+  require(options.accel_bias_sigma > 0, "accel_bias_sigma", options.accel_bias_sigma, "positive");
+  require(options.rest_accel_sigma > 0, "rest_accel_sigma", options.rest_accel_sigma, "positive");
+  require(options.rest_gyro > 0, "rest_gyro", options.rest_gyro, "positive");
+  require(options.threads >= 0, "threads", options.threads, "at least 0");
+}
+
+class StereoInertialOdometry::Impl {
+ public:
+  Impl(const flow::StereoRig& rig, const SE3& T_body_left, const ImuNoise& noise,
+       const VioOptions& options)
+      : cameras_(rig),
+        options_(WithThreads(options)),
+        flow_(rig, options_.flow),
+        imu_(noise, options.imu),
+        window_(RigOf(rig, T_body_left), options.window, options.threads) {
+    CheckOptions(options);
+  }
+
+  void AddImu(const ImuSample& sample) { imu_.Add(sample); }
+
+  VioFrameResult Process(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right) {
+    Stopwatch total, stage;
+    VioFrameResult result{.time_ns = time_ns, .segment = segment_};
+    Frame frame = Predict(time_ns);
+    const flow::FlowFrame seen = flow_.Process(time_ns, left, right, RotationSinceLast(frame));
+    result.flow = seen.times;
+    result.times.flow_s = stage.Lap();
+    result.tracks = static_cast<int>(seen.observations.size());
+    result.stereo_tracks = seen.stereo;
+    if (window_.frames.empty()) Begin(frame);
+    window_.frames.push_back(std::move(frame));
+    Observe(seen);
+    result.landmarks = CountSeen();
+    const bool blind = window_.frames.size() > 1 && result.landmarks < options_.least_sights;
+    if (!blind && NeedsKeyframe(seen, result.landmarks)) MakeKeyframe(seen, result);
+    Refine(blind, result);
+    result.times.refinement_s = stage.Lap();
+    if (result.state == VioState::kLost)
+      Lose();
+    else
+      Marginalize();
+    imu_.DropBefore(time_ns);
+    result.times.marginalization_s = stage.Lap();
+    result.body = last_;
+    result.times.total_s = total.Lap();
+    return result;
+  }
+
+  const ImuHealth& imu_health() const { return imu_.health(); }
+
+  std::vector<VioPoint> TakeFinishedPoints() { return std::exchange(finished_, {}); }
+
+  std::vector<VioPoint> ActivePoints() const {
+    std::vector<VioPoint> points;
+    for (const auto& [id, landmark] : window_.landmarks) points.push_back(ToPoint(landmark));
+    return points;
+  }
+
+ private:
+  static VioOptions WithThreads(VioOptions options) {
+    options.flow.threads = options.threads;
+    return options;
+  }
+
+  static VioRig RigOf(const flow::StereoRig& rig, const SE3& T_body_left) {
+    return {{T_body_left, T_body_left * rig.T_left_right}, 0.5 * (rig.left.fx + rig.left.fy)};
+  }
+
+  const Frame* Newest() const { return window_.frames.empty() ? nullptr : &window_.frames.back(); }
+
+  /// The new frame where the inertial sensor, or constant velocity, takes the last one.
+  Frame Predict(std::int64_t time_ns) const {
+    Frame frame;
+    frame.id = next_id_;
+    frame.state = last_;
+    frame.state.time_ns = time_ns;
+    const Frame* last = Newest();
+    if (!last) return frame;
+    if (options_.inertial)
+      frame.since_last = imu_.Between(last->state.time_ns, time_ns, BiasOf(last->state));
+    if (frame.since_last && last->inertial) {
+      frame.state = frame.since_last->Predict(last->state, options_.window.gravity);
+      frame.inertial = true;
+    } else if (window_.frames.size() >= 2) {
+      const BodyState& before = window_.frames[window_.frames.size() - 2].state;
+      const double share = static_cast<double>(time_ns - last->state.time_ns) /
+                           static_cast<double>(last->state.time_ns - before.time_ns);
+      const SE3 motion = before.T_world_body.Inverse() * last->state.T_world_body;
+      frame.state.T_world_body = last->state.T_world_body * Part(motion, share);
+    }
+    return frame;
+  }
+
+  std::optional<Eigen::Quaterniond> RotationSinceLast(const Frame& frame) const {
+    const Frame* last = Newest();
+    if (!last || !frame.since_last) return std::nullopt;
+    const Eigen::Quaterniond R_body_left = window_.rig().T_body_cam[0].R;
+    return R_body_left.conjugate() * frame.state.T_world_body.R.conjugate() *
+           last->state.T_world_body.R * R_body_left;
+  }
+
+  // --- Begin ---
+
+  /// The first frame of a map. Its attitude is what the accelerometer says, if there is one.
+  void Begin(Frame& frame) {
+    constexpr double kHeld = 1e-4;
+    StateVector sigmas = StateVector::Constant(kHeld);
+    if (options_.inertial && !imu_.samples().empty()) {
+      const bool rest = StartFromGravity(frame.state);
+      frame.inertial = true;
+      sigmas.segment<2>(kRotation).setConstant(rest ? 0.03 : 0.2);
+      sigmas.segment<3>(kVelocity).setConstant(rest ? 0.05 : 3);
+      sigmas.segment<3>(kGyroBias).setConstant(options_.gyro_bias_sigma);
+      sigmas.segment<3>(kAccelBias).setConstant(options_.accel_bias_sigma);
+    }
+    frame.keyframe = true;
+    window_.Anchor(frame, sigmas);
+  }
+
+  /// Attitude from the mean acceleration.
+  /// @return whether the body is at rest.
+  bool StartFromGravity(BodyState& state) const {
+    Vector3d accel = Vector3d::Zero(), gyro = Vector3d::Zero();
+    const auto n = static_cast<double>(imu_.samples().size());
+    for (const ImuSample& sample : imu_.samples()) {
+      accel += sample.accel / n;
+      gyro += sample.gyro / n;
+    }
+    double accel_spread = 0, gyro_spread = 0;
+    for (const ImuSample& sample : imu_.samples()) {
+      accel_spread += (sample.accel - accel).squaredNorm() / n;
+      gyro_spread += (sample.gyro - gyro).squaredNorm() / n;
+    }
+    state.T_world_body.R = Eigen::Quaterniond::FromTwoVectors(accel, Vector3d::UnitZ());
+    constexpr double kLeastSamples = 10;
+    const bool rest = n >= kLeastSamples && std::sqrt(accel_spread) < options_.rest_accel_sigma &&
+                      std::sqrt(gyro_spread) < options_.rest_gyro;
+    state.gyro_bias = rest ? gyro : Vector3d::Zero();
+    return rest;
+  }
+
+  // --- Every frame ---
+
+  std::optional<Vector2d> RayOf(const Camera& camera, const Vector2d& pixel) const {
+    const auto ray = camera.TryUnproject(pixel);
+    return ray ? std::optional<Vector2d>(ray->head<2>()) : std::nullopt;
+  }
+
+  /// Remembers what the newest frame shows, and adds it to the landmarks.
+  void Observe(const flow::FlowFrame& seen) {
+    const int id = Newest()->id;
+    next_id_ = id + 1;
+    std::map<std::int64_t, std::vector<LandmarkSight>> tracks;  // those that go on
+    for (const flow::FlowObservation& at : seen.observations) {
+      std::vector<LandmarkSight> sights;
+      if (const auto ray = RayOf(cameras_.left, at.left_px)) sights.push_back({id, 0, *ray});
+      if (at.right_px)
+        if (const auto ray = RayOf(cameras_.right, *at.right_px)) sights.push_back({id, 1, *ray});
+      if (sights.empty() || sights[0].camera != 0) continue;
+      const auto landmark = window_.landmarks.find(at.id);
+      if (landmark != window_.landmarks.end()) {
+        auto& all = landmark->second.sights;
+        all.insert(all.end(), sights.begin(), sights.end());
+      }
+      auto& track = tracks[at.id];
+      if (const auto before = tracks_.find(at.id); before != tracks_.end())
+        track = std::move(before->second);
+      std::erase_if(track, [&](const LandmarkSight& s) { return !window_.Find(s.frame); });
+      track.insert(track.end(), sights.begin(), sights.end());
+    }
+    tracks_ = std::move(tracks);
+  }
+
+  /// Landmarks that the newest frame sees.
+  int CountSeen() const {
+    int count = 0;
+    for (const auto& [id, track] : tracks_) count += window_.landmarks.contains(id);
+    return count;
+  }
+
+  bool NeedsKeyframe(const flow::FlowFrame& seen, int landmarks) const {
+    if (window_.frames.size() == 1) return true;
+    if (seen.observations.empty()) return false;
+    const double share = landmarks / static_cast<double>(seen.observations.size());
+    return share < options_.keyframe_share && since_keyframe_ + 1 >= options_.keyframe_gap;
+  }
+
+  /// Tracks without a landmark become one of the newest frame, where two rays tell its depth.
+  void MakeKeyframe(const flow::FlowFrame& seen, VioFrameResult& result) {
+    Frame& frame = window_.frames.back();
+    frame.keyframe = result.new_keyframe = true;
+    for (const flow::FlowObservation& at : seen.observations) {
+      const auto track = tracks_.find(at.id);
+      if (track == tracks_.end() || window_.landmarks.contains(at.id)) continue;
+      if (auto landmark = MakeLandmark(frame, track->second))
+        window_.landmarks.emplace(at.id, std::move(*landmark));
+    }
+  }
+
+  std::optional<Landmark> MakeLandmark(const Frame& host,
+                                       const std::vector<LandmarkSight>& track) const {
+    const auto own = std::find_if(track.begin(), track.end(), [&](const LandmarkSight& sight) {
+      return sight.frame == host.id && sight.camera == 0;
+    });
+    if (own == track.end()) return std::nullopt;
+    const SE3 T_world_host = window_.PoseOf(host, 0);
+    // The right image first, then the oldest frame.
+    std::vector<const LandmarkSight*> others;
+    for (const LandmarkSight& sight : track)
+      if (sight.frame == host.id && sight.camera == 1) others.push_back(&sight);
+    for (const LandmarkSight& sight : track)
+      if (sight.frame != host.id) others.push_back(&sight);
+    for (const LandmarkSight* other : others) {
+      const SE3 T_other_host =
+          window_.PoseOf(*window_.Find(other->frame), other->camera).Inverse() * T_world_host;
+      const double least = other->frame == host.id ? 1e-3 : options_.least_parallax;
+      if (const auto rho = TriangulateInverseDepth(own->ray, other->ray, T_other_host, least)) {
+        return Landmark{
+            .host = host.id, .ray = own->ray, .inverse_depth = *rho, .sights = track};
+      }
+    }
+    return std::nullopt;
+  }
+
+  void Refine(bool blind, VioFrameResult& result) {
+    const Frame& newest = window_.frames.back();
+    const bool first = window_.frames.size() == 1;
+    if (!first) {
+      result.window = window_.Refine();
+      result.window.outliers = window_.RemoveOutliers();
+    }
+    const double blind_s = 1e-9 * static_cast<double>(newest.state.time_ns - last_sight_ns_);
+    if (!first && !result.window.usable) {
+      result.state = VioState::kLost;
+    } else if (blind) {
+      result.state = newest.inertial && blind_s <= options_.blind_s ? VioState::kPredicted
+                                                                    : VioState::kLost;
+    } else {
+      result.state = first && window_.landmarks.empty() ? VioState::kInitialising
+                                                        : VioState::kTracked;
+      last_sight_ns_ = newest.state.time_ns;
+    }
+    if (result.state == VioState::kLost) return;
+    since_keyframe_ = result.new_keyframe ? 0 : since_keyframe_ + 1;
+    last_ = newest.state;
+    if (options_.covariance) result.covariance = window_.CovarianceOf(newest);
+  }
+
+  /// A new map begins at the last believed state.
+  void Lose() {
+    for (const auto& [id, landmark] : window_.landmarks) finished_.push_back(ToPoint(landmark));
+    window_ = Window(window_.rig(), options_.window, options_.threads);
+    tracks_.clear();
+    ++segment_;
+    since_keyframe_ = 0;
+  }
+
+  // --- Leaving the window ---
+
+  void Marginalize() {
+    std::vector<int> leaving, motions;
+    const int count = static_cast<int>(window_.frames.size());
+    std::vector<const Frame*> keyframes;
+    for (int k = 0; k < count - options_.states; ++k) {
+      const Frame& frame = window_.frames[k];
+      if (!frame.keyframe) {
+        leaving.push_back(frame.id);
+        continue;
+      }
+      keyframes.push_back(&frame);
+      if (frame.inertial) motions.push_back(frame.id);
+    }
+    if (static_cast<int>(keyframes.size()) > options_.keyframes)
+      leaving.push_back(LeastUseful(keyframes));
+    if (leaving.empty() && motions.empty()) return;
+    const std::set<int> hosts(leaving.begin(), leaving.end());
+    for (const auto& [id, landmark] : window_.landmarks)
+      if (hosts.contains(landmark.host)) finished_.push_back(ToPoint(landmark));
+    std::erase_if(motions, [&](int id) { return hosts.contains(id); });
+    window_.Marginalize(leaving, motions);
+  }
+
+  /// One that hardly any track still sees, else the one that is far from the newest and near to
+  /// others (Engel, Koltun, Cremers, 2018, eq. 20).
+  int LeastUseful(const std::vector<const Frame*>& keyframes) const {
+    std::map<int, std::pair<int, int>> seen;  // by host: of its landmarks, how many
+    for (const auto& [id, landmark] : window_.landmarks) {
+      auto& [now, all] = seen[landmark.host];
+      ++all;
+      now += tracks_.contains(id);
+    }
+    constexpr double kHardly = 0.05;
+    const size_t old = keyframes.size() - 1;  // the newest of them stays
+    for (size_t k = 0; k < old; ++k) {
+      const auto [now, all] = seen[keyframes[k]->id];
+      if (now <= kHardly * all) return keyframes[k]->id;
+    }
+    const auto place = [](const Frame& frame) { return frame.state.T_world_body.p; };
+    int least = keyframes[0]->id;
+    double highest = -1;
+    for (size_t k = 0; k < old; ++k) {
+      double near = 0;
+      for (size_t j = 0; j < old; ++j)
+        if (j != k) near += 1 / ((place(*keyframes[k]) - place(*keyframes[j])).norm() + 1e-5);
+      const double far = (place(*keyframes[k]) - place(*Newest())).norm();
+      const double score = std::sqrt(far) * near;
+      if (score > highest) {
+        highest = score;
+        least = keyframes[k]->id;
+      }
+    }
+    return least;
+  }
+
+  VioPoint ToPoint(const Landmark& landmark) const {
+    const SE3 T_world_cam = window_.PoseOf(*window_.Find(landmark.host), 0);
+    return {.position = T_world_cam * (landmark.ray.homogeneous() / landmark.inverse_depth),
+            .inverse_depth = landmark.inverse_depth,
+            .inverse_depth_variance = landmark.inverse_depth_variance,
+            .support = static_cast<int>(landmark.sights.size()),
+            .segment = segment_};
+  }
+
+  flow::StereoRig cameras_;
+  VioOptions options_;
+  flow::StereoFlow flow_;
+  ImuBuffer imu_;
+  Window window_;
+  std::map<std::int64_t, std::vector<LandmarkSight>> tracks_;  ///< of the newest frame, by id
+  std::vector<VioPoint> finished_;
+  BodyState last_;
+  int next_id_ = 0;
+  int since_keyframe_ = 0;
+  int segment_ = 0;
+  std::int64_t last_sight_ns_ = 0;
+};
+
+StereoInertialOdometry::StereoInertialOdometry(const flow::StereoRig& rig, const SE3& T_body_left,
+                                               const ImuNoise& noise, const VioOptions& options)
+    : impl_(std::make_unique<Impl>(rig, T_body_left, noise, options)) {}
+StereoInertialOdometry::~StereoInertialOdometry() = default;
+StereoInertialOdometry::StereoInertialOdometry(StereoInertialOdometry&&) noexcept = default;
+StereoInertialOdometry& StereoInertialOdometry::operator=(StereoInertialOdometry&&) noexcept =
+    default;
+
+void StereoInertialOdometry::AddImu(const ImuSample& sample) { impl_->AddImu(sample); }
+VioFrameResult StereoInertialOdometry::Process(std::int64_t time_ns, const cv::Mat& left,
+                                               const cv::Mat& right) {
+  return impl_->Process(time_ns, left, right);
+}
+const ImuHealth& StereoInertialOdometry::imu_health() const { return impl_->imu_health(); }
+std::vector<VioPoint> StereoInertialOdometry::TakeFinishedPoints() {
+  return impl_->TakeFinishedPoints();
+}
+std::vector<VioPoint> StereoInertialOdometry::ActivePoints() const {
+  return impl_->ActivePoints();
+}
+
+std::span<const std::pair<const char*, VioState>> EnumNames(VioState) {
+  static constexpr std::pair<const char*, VioState> kNames[] = {
+      {"initialising", VioState::kInitialising},
+      {"tracked", VioState::kTracked},
+      {"predicted", VioState::kPredicted},
+      {"lost", VioState::kLost}};
+  return kNames;
+}
+
+}  // namespace sgf::vio

@@ -1,0 +1,521 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <ceres/ceres.h>
+#include <fmt/core.h>
+
+#include <sgf/core/error.h>
+#include <sgf/core/parallel.h>
+#include <sgf/core/square_root.h>
+#include <sgf/vio/visual_equations.h>
+#include <sgf/vio/window.h>
+
+namespace sgf::vio {
+namespace {
+
+using Eigen::Index, Eigen::Matrix3d, Eigen::MatrixXd, Eigen::VectorXd;
+using Matrix15 = Eigen::Matrix<double, 15, 15>;
+using Vector15 = Eigen::Matrix<double, 15, 1>;
+
+/// A window's frames and landmarks as parameters: differences from where they are linearised.
+class Linearization {
+ public:
+  explicit Linearization(std::deque<Frame>& frames) : frames_(frames) {
+    for (Frame& frame : frames) {
+      if (!frame.in_prior) frame.linearization = frame.state;
+      blocks_.push_back({frame.id, false});
+    }
+    for (const Frame& frame : frames)
+      if (frame.inertial) blocks_.push_back({frame.id, true});
+    Index size = 0;
+    for (const BlockId block : blocks_) {
+      offsets_.push_back(size);
+      size += block.size();
+    }
+    x_.setZero(size);
+    for (const Frame& frame : frames)
+      if (frame.in_prior) SetParameters(frame.id, Minus(frame.state, frame.linearization));
+    poses_.resize(frames.size());
+    UpdatePoses();
+  }
+
+  std::deque<Frame>& frames() const { return frames_; }
+  const std::vector<BlockId>& blocks() const { return blocks_; }
+  VectorXd& x() { return x_; }
+  const VectorXd& x() const { return x_; }
+  std::span<const PoseState> poses() const { return poses_; }
+
+  Index OffsetOf(BlockId block) const {
+    return offsets_[std::find(blocks_.begin(), blocks_.end(), block) - blocks_.begin()];
+  }
+
+  int PositionOf(int id) const {
+    const auto it = std::find_if(frames_.begin(), frames_.end(),
+                                 [&](const Frame& frame) { return frame.id == id; });
+    return static_cast<int>(it - frames_.begin());
+  }
+
+  /// The state of a frame at some parameters.
+  BodyState StateAt(const Frame& frame, const double* pose, const double* motion) const {
+    Vector15 delta = Vector15::Zero();
+    delta.head<kPoseParameters>() = Eigen::Map<const Eigen::Matrix<double, 6, 1>>(pose);
+    if (motion)
+      delta.tail<kMotionParameters>() = Eigen::Map<const Eigen::Matrix<double, 9, 1>>(motion);
+    return Plus(frame.linearization, delta);
+  }
+
+  BodyState StateOf(const Frame& frame) const {
+    return StateAt(frame, x_.data() + OffsetOf({frame.id, false}),
+                   frame.inertial ? x_.data() + OffsetOf({frame.id, true}) : nullptr);
+  }
+
+  /// Derivatives by the parameters are those by the local tangent times this, for the rotation.
+  static Matrix3d TurnOf(const Frame& frame, const Eigen::Vector3d& rotation) {
+    return frame.in_prior ? Matrix3d::Identity() : RightJacobianSO3(rotation);
+  }
+
+  void UpdatePoses() {
+    for (size_t k = 0; k < frames_.size(); ++k) {
+      const double* pose = x_.data() + offsets_[k];  // poses come first
+      const SE3 T = StateAt(frames_[k], pose, nullptr).T_world_body;
+      poses_[k] = {T, frames_[k].in_prior ? frames_[k].linearization.T_world_body : T,
+                   TurnOf(frames_[k], Eigen::Map<const Eigen::Vector3d>(pose))};
+    }
+  }
+
+  void WriteBack() {
+    for (Frame& frame : frames_) {
+      const std::int64_t time_ns = frame.state.time_ns;
+      frame.state = StateOf(frame);
+      frame.state.time_ns = time_ns;
+    }
+  }
+
+ private:
+  void SetParameters(int id, const Vector15& delta) {
+    x_.segment<kPoseParameters>(OffsetOf({id, false})) = delta.head<kPoseParameters>();
+    if (const BlockId motion{id, true};
+        std::find(blocks_.begin(), blocks_.end(), motion) != blocks_.end())
+      x_.segment<kMotionParameters>(OffsetOf(motion)) = delta.tail<kMotionParameters>();
+  }
+
+  std::deque<Frame>& frames_;
+  std::vector<BlockId> blocks_;
+  std::vector<Index> offsets_;
+  VectorXd x_;
+  std::vector<PoseState> poses_;
+};
+
+std::vector<LandmarkItem> ItemsOf(const Linearization& at,
+                                  std::map<std::int64_t, Landmark>& landmarks) {
+  std::vector<LandmarkItem> items;
+  for (auto& [id, landmark] : landmarks) {
+    LandmarkItem& item = items.emplace_back();
+    item.landmark = &landmark;
+    item.host = at.PositionOf(landmark.host);
+    for (const LandmarkSight& sight : landmark.sights)
+      item.frames.push_back(at.PositionOf(sight.frame));
+    item.value << landmark.ray, landmark.inverse_depth;
+  }
+  return items;
+}
+
+/// Landmarks as a cost function of all poses. They follow the poses: they are where the
+/// linearisation has its minimum for them, so that the solver has a small dense problem. Residuals
+/// are the square root of the reduced equations and one more that makes up for the rest of the
+/// cost.
+class VisualCost : public ceres::CostFunction {
+ public:
+  VisualCost(const VisualEquations& equations, Linearization& at, std::vector<LandmarkItem>& items)
+      : equations_(equations), at_(at), items_(items) {
+    mutable_parameter_block_sizes()->assign(at.frames().size(), kPoseParameters);
+    set_num_residuals(kPoseParameters * static_cast<int>(at.frames().size()) + 1);
+    linear_x_ = Poses();
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const int n = kPoseParameters * static_cast<int>(at_.frames().size());
+    for (size_t k = 0; k < at_.frames().size(); ++k)
+      std::copy_n(parameters[k], kPoseParameters, at_.x().data() + kPoseParameters * k);
+    at_.UpdatePoses();
+    if (linearized_) equations_.MoveLandmarks(Poses() - linear_x_, items_);
+    Eigen::Map<VectorXd> r(residuals, num_residuals());
+    r.setZero();
+    if (!jacobians) {
+      r(n) = std::sqrt(2 * equations_.Cost(at_.poses(), items_));
+      return std::isfinite(r(n));
+    }
+    ReducedEquations reduced;
+    const double cost = equations_.Linearize(at_.poses(), items_, reduced);
+    linear_x_ = Poses();
+    linearized_ = true;
+    const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
+    r.head(root.e.size()) = root.e;
+    r(n) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
+    for (size_t k = 0; k < at_.frames().size(); ++k) {
+      if (!jacobians[k]) continue;
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kPoseParameters, Eigen::RowMajor>;
+      Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), kPoseParameters);
+      J.setZero();
+      J.topRows(root.S.rows()) =
+          root.S.middleCols<kPoseParameters>(kPoseParameters * static_cast<Index>(k));
+    }
+    return std::isfinite(cost);
+  }
+
+  /// Landmarks where they belong for the poses as they are.
+  void Settle() {
+    at_.UpdatePoses();
+    if (linearized_) equations_.MoveLandmarks(Poses() - linear_x_, items_);
+  }
+
+ private:
+  VectorXd Poses() const {
+    return at_.x().head(kPoseParameters * static_cast<Index>(at_.frames().size()));
+  }
+
+  const VisualEquations& equations_;
+  Linearization& at_;
+  std::vector<LandmarkItem>& items_;
+  mutable VectorXd linear_x_;  // Ceres takes cost functions as constant
+  mutable bool linearized_ = false;
+};
+
+/// Whitened residual of the inertial sensor between two frames.
+class InertialCost : public ceres::SizedCostFunction<15, kPoseParameters, kMotionParameters,
+                                                     kPoseParameters, kMotionParameters> {
+ public:
+  InertialCost(const Linearization& at, const Frame& from, const Frame& to, double gravity)
+      : at_(at),
+        from_(from),
+        to_(to),
+        gravity_(gravity),
+        weight_(to.since_last->SquareRootInformation()) {}
+
+  std::array<BlockId, 4> blocks() const {
+    return {{{from_.id, false}, {from_.id, true}, {to_.id, false}, {to_.id, true}}};
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const BodyState from = at_.StateAt(from_, parameters[0], parameters[1]),
+                    to = at_.StateAt(to_, parameters[2], parameters[3]);
+    const Preintegration& imu = *to_.since_last;
+    Eigen::Map<Vector15> r(residuals);
+    r = weight_ * imu.Residual(from, to, gravity_, nullptr, nullptr);
+    if (!jacobians) return r.allFinite();
+    Matrix15 J_from, J_to;
+    imu.Residual(from_.in_prior ? from_.linearization : from,
+                 to_.in_prior ? to_.linearization : to, gravity_, &J_from, &J_to);
+    J_from.leftCols<3>() *=
+        Linearization::TurnOf(from_, Eigen::Map<const Eigen::Vector3d>(parameters[0]));
+    J_to.leftCols<3>() *=
+        Linearization::TurnOf(to_, Eigen::Map<const Eigen::Vector3d>(parameters[2]));
+    const Matrix15 whole_from = weight_ * J_from, whole_to = weight_ * J_to;
+    using Pose = Eigen::Matrix<double, 15, kPoseParameters, Eigen::RowMajor>;
+    using Motion = Eigen::Matrix<double, 15, kMotionParameters, Eigen::RowMajor>;
+    if (jacobians[0]) Eigen::Map<Pose>{jacobians[0]} = whole_from.leftCols<kPoseParameters>();
+    if (jacobians[1]) Eigen::Map<Motion>{jacobians[1]} = whole_from.rightCols<kMotionParameters>();
+    if (jacobians[2]) Eigen::Map<Pose>{jacobians[2]} = whole_to.leftCols<kPoseParameters>();
+    if (jacobians[3]) Eigen::Map<Motion>{jacobians[3]} = whole_to.rightCols<kMotionParameters>();
+    return r.allFinite();
+  }
+
+ private:
+  const Linearization& at_;
+  const Frame& from_;
+  const Frame& to_;
+  double gravity_;
+  Matrix15 weight_;
+};
+
+/// |S x + e|^2 / 2
+class PriorCost : public ceres::CostFunction {
+ public:
+  explicit PriorCost(const SquareRootPrior& prior) : prior_(prior) {
+    set_num_residuals(static_cast<int>(prior.e().size()));
+    for (const BlockId block : prior.blocks())
+      mutable_parameter_block_sizes()->push_back(block.size());
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    Eigen::Map<VectorXd> r(residuals, num_residuals());
+    r = prior_.e();
+    Index column = 0;
+    for (size_t k = 0; k < prior_.blocks().size(); ++k) {
+      const int size = prior_.blocks()[k].size();
+      const auto S = prior_.S().middleCols(column, size);
+      r += S * Eigen::Map<const VectorXd>(parameters[k], size);
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      if (jacobians && jacobians[k])
+        Eigen::Map<RowMajor>(jacobians[k], num_residuals(), size) = S;
+      column += size;
+    }
+    return true;
+  }
+
+ private:
+  const SquareRootPrior& prior_;
+};
+
+/// Costs of the inertial sensor between neighbouring frames that both have a motion.
+std::deque<InertialCost> InertialCosts(const Linearization& at, double gravity) {
+  std::deque<InertialCost> costs;  // cost functions cannot be moved
+  const auto& frames = at.frames();
+  for (size_t k = 1; k < frames.size(); ++k)
+    if (frames[k].since_last && frames[k].inertial && frames[k - 1].inertial)
+      costs.emplace_back(at, frames[k - 1], frames[k], gravity);
+  return costs;
+}
+
+/// A cost as rows of [S e] in its blocks, at the parameters as they are.
+SquareRoot RowsOf(const ceres::CostFunction& cost, std::span<const BlockId> blocks,
+                  const Linearization& at) {
+  const int rows = cost.num_residuals();
+  SquareRoot result{MatrixXd(rows, 0), VectorXd(rows)};
+  std::vector<const double*> parameters;
+  std::vector<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> J;
+  std::vector<double*> jacobians;
+  for (const BlockId block : blocks) {
+    parameters.push_back(at.x().data() + at.OffsetOf(block));
+    J.emplace_back(rows, block.size());
+  }
+  for (auto& block : J) jacobians.push_back(block.data());
+  cost.Evaluate(parameters.data(), result.e.data(), jacobians.data());
+  for (size_t k = 0; k < blocks.size(); ++k) {
+    const Index column = result.S.cols();
+    result.S.conservativeResize(rows, column + blocks[k].size());
+    result.S.rightCols(blocks[k].size()) = J[k];
+    // Parameters count from where the frame is linearised.
+    result.e -= J[k] * at.x().segment(at.OffsetOf(blocks[k]), blocks[k].size());
+  }
+  return result;
+}
+
+}  // namespace
+
+void CheckOptions(const WindowOptions& options) {
+  const auto require = [](bool valid, const char* option, double value, const char* range) {
+    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
+  };
+  require(options.max_iterations >= 1, "window.max_iterations", options.max_iterations, "positive");
+  require(options.sigma_px > 0, "window.sigma_px", options.sigma_px, "positive");
+  require(options.huber_sigmas > 0, "window.huber_sigmas", options.huber_sigmas, "positive");
+  require(options.outlier_px > 0, "window.outlier_px", options.outlier_px, "positive");
+  require(options.tolerance >= 0, "window.tolerance", options.tolerance, "at least 0");
+  require(options.gravity > 0, "window.gravity", options.gravity, "positive");
+}
+
+Window::Window(const VioRig& rig, const WindowOptions& options, int threads)
+    : rig_(rig), options_(options), threads_(threads) {
+  CheckOptions(options);
+}
+
+const Frame* Window::Find(int id) const {
+  for (const Frame& frame : frames)
+    if (frame.id == id) return &frame;
+  return nullptr;
+}
+
+Frame* Window::Find(int id) { return const_cast<Frame*>(std::as_const(*this).Find(id)); }
+
+SE3 Window::PoseOf(const Frame& frame, int camera) const {
+  return frame.state.T_world_body * rig_.T_body_cam[camera];
+}
+
+void Window::Anchor(Frame& frame, const Vector15& sigmas) {
+  frame.linearization = frame.state;
+  frame.in_prior = true;
+  const Vector15 weights = sigmas.cwiseInverse();
+  const BlockId pose{frame.id, false}, motion{frame.id, true};
+  MatrixXd S = weights.head<kPoseParameters>().asDiagonal();
+  S.topLeftCorner<3, 3>() *= frame.state.T_world_body.R.toRotationMatrix();
+  prior_.Add(std::span(&pose, 1), S, VectorXd::Zero(kPoseParameters));
+  if (frame.inertial)
+    prior_.Add(std::span(&motion, 1), MatrixXd(weights.tail<kMotionParameters>().asDiagonal()),
+               VectorXd::Zero(kMotionParameters));
+}
+
+WindowSummary Window::Refine() {
+  Linearization at(frames);
+  std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
+  const VisualEquations equations(rig_, options_, threads_);
+  std::vector<VectorXd> parameters;
+  std::map<BlockId, double*> pointer;
+  for (const BlockId block : at.blocks())
+    parameters.push_back(at.x().segment(at.OffsetOf(block), block.size()));
+  for (size_t k = 0; k < parameters.size(); ++k) pointer[at.blocks()[k]] = parameters[k].data();
+
+  ceres::Problem::Options problem_options;
+  problem_options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(problem_options);
+  for (size_t k = 0; k < parameters.size(); ++k)
+    problem.AddParameterBlock(parameters[k].data(), at.blocks()[k].size());
+  VisualCost visual(equations, at, items);
+  std::vector<double*> poses;
+  for (const Frame& frame : frames) poses.push_back(pointer.at({frame.id, false}));
+  problem.AddResidualBlock(&visual, nullptr, poses);
+  std::deque<InertialCost> inertial = InertialCosts(at, options_.gravity);
+  for (InertialCost& cost : inertial) {
+    std::vector<double*> blocks;
+    for (const BlockId block : cost.blocks()) blocks.push_back(pointer.at(block));
+    problem.AddResidualBlock(&cost, nullptr, blocks);
+  }
+  PriorCost prior(prior_);
+  if (prior.num_residuals() > 0) {
+    std::vector<double*> blocks;
+    for (const BlockId block : prior_.blocks()) blocks.push_back(pointer.at(block));
+    problem.AddResidualBlock(&prior, nullptr, blocks);
+  }
+
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = options_.max_iterations;
+  options.function_tolerance = options_.tolerance;
+  options.num_threads = 1;  // the order of sums must not depend on them
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary report;
+  ceres::Solve(options, &problem, &report);
+  WindowSummary summary;
+  summary.iterations = static_cast<int>(report.iterations.size());
+  summary.cost = report.final_cost;
+  summary.usable = report.IsSolutionUsable();
+  for (const VectorXd& block : parameters) summary.usable = summary.usable && block.allFinite();
+  if (!summary.usable) return summary;  // nothing was written
+  for (size_t k = 0; k < parameters.size(); ++k)
+    at.x().segment(at.OffsetOf(at.blocks()[k]), parameters[k].size()) = parameters[k];
+  visual.Settle();
+  at.WriteBack();
+  for (const LandmarkItem& item : items) {
+    item.landmark->ray = item.value.head<2>();
+    item.landmark->inverse_depth = item.value.z();
+    item.landmark->inverse_depth_variance = item.H_inverse(2, 2);
+    summary.sights += static_cast<int>(item.frames.size());
+  }
+  return summary;
+}
+
+int Window::RemoveOutliers() {
+  const Linearization at(frames);
+  const std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
+  const VisualEquations equations(rig_, options_, threads_);
+  int outliers = 0;
+  for (const LandmarkItem& item : items) {
+    std::vector<LandmarkSight> good;
+    for (size_t k = 0; k < item.frames.size(); ++k) {
+      if (equations.ErrorPx(at.poses(), item, k) <= options_.outlier_px)
+        good.push_back(item.landmark->sights[k]);
+      else
+        ++outliers;
+    }
+    item.landmark->sights = std::move(good);
+  }
+  std::erase_if(landmarks, [](const auto& entry) {
+    const Landmark& landmark = entry.second;
+    return landmark.sights.empty() || !(landmark.inverse_depth > 0) || !landmark.ray.allFinite();
+  });
+  return outliers;
+}
+
+void Window::Marginalize(std::span<const int> leaving, std::span<const int> motions) {
+  const auto leaves = [&](int id) {
+    return std::find(leaving.begin(), leaving.end(), id) != leaving.end();
+  };
+  const auto slows = [&](int id) {
+    return leaves(id) || std::find(motions.begin(), motions.end(), id) != motions.end();
+  };
+  Linearization at(frames);
+  std::map<std::int64_t, Landmark> hosted;
+  for (const auto& [id, landmark] : landmarks)
+    if (leaves(landmark.host)) hosted.emplace(id, landmark);
+  if (!hosted.empty()) {
+    std::vector<LandmarkItem> items = ItemsOf(at, hosted);
+    const VisualEquations equations(rig_, options_, threads_);
+    std::vector<BlockId> blocks;
+    for (const Frame& frame : frames) blocks.push_back({frame.id, false});
+    const SquareRoot rows = RowsOf(VisualCost(equations, at, items), blocks, at);
+    // Frames that see none of the landmarks stay out of the prior.
+    std::vector<BlockId> touched;
+    MatrixXd S(rows.S.rows(), 0);
+    for (size_t k = 0; k < blocks.size(); ++k) {
+      const auto columns =
+          rows.S.middleCols<kPoseParameters>(kPoseParameters * static_cast<Index>(k));
+      if (columns.squaredNorm() == 0) continue;
+      touched.push_back(blocks[k]);
+      S.conservativeResize(Eigen::NoChange, S.cols() + kPoseParameters);
+      S.rightCols<kPoseParameters>() = columns;
+    }
+    prior_.Add(touched, S, rows.e);
+  }
+  for (const InertialCost& cost : InertialCosts(at, options_.gravity)) {
+    const auto blocks = cost.blocks();
+    if (!slows(blocks[0].frame) && !slows(blocks[2].frame)) continue;
+    const SquareRoot rows = RowsOf(cost, blocks, at);
+    prior_.Add(blocks, rows.S, rows.e);
+    Find(blocks[2].frame)->since_last.reset();
+  }
+  for (Frame& frame : frames)
+    if (prior_.Has({frame.id, false}) || prior_.Has({frame.id, true})) frame.in_prior = true;
+
+  std::vector<BlockId> gone;
+  for (const int id : leaving) gone.insert(gone.end(), {{id, false}, {id, true}});
+  for (const int id : motions) gone.push_back({id, true});
+  prior_.Marginalize(gone);
+  for (const int id : motions) Find(id)->inertial = false;
+  std::erase_if(frames, [&](const Frame& frame) { return leaves(frame.id); });
+  for (auto it = landmarks.begin(); it != landmarks.end();) {
+    Landmark& landmark = it->second;
+    std::erase_if(landmark.sights,
+                  [&](const LandmarkSight& sight) { return leaves(sight.frame); });
+    it = leaves(landmark.host) || landmark.sights.empty() ? landmarks.erase(it) : std::next(it);
+  }
+}
+
+Matrix15 Window::CovarianceOf(const Frame& frame) const {
+  std::deque<Frame> copy = frames;
+  std::map<std::int64_t, Landmark> seen = landmarks;
+  Linearization at(copy);
+  std::vector<LandmarkItem> items = ItemsOf(at, seen);
+  const VisualEquations equations(rig_, options_, threads_);
+  MatrixXd H = MatrixXd::Zero(at.x().size(), at.x().size());
+  ReducedEquations reduced;
+  equations.Linearize(at.poses(), items, reduced);
+  H.topLeftCorner(reduced.H.rows(), reduced.H.cols()) = reduced.H;
+  const auto add = [&](std::span<const BlockId> blocks, const MatrixXd& S) {
+    Index row = 0;
+    for (const BlockId a : blocks) {
+      Index column = 0;
+      for (const BlockId b : blocks) {
+        H.block(at.OffsetOf(a), at.OffsetOf(b), a.size(), b.size()) +=
+            S.middleCols(row, a.size()).transpose() * S.middleCols(column, b.size());
+        column += b.size();
+      }
+      row += a.size();
+    }
+  };
+  for (const InertialCost& cost : InertialCosts(at, options_.gravity))
+    add(cost.blocks(), RowsOf(cost, cost.blocks(), at).S);
+  add(prior_.blocks(), prior_.S());
+  // Parameters have units of their own.
+  const VectorXd unit = (H.diagonal().array() + 1e-10).rsqrt();
+  const MatrixXd scaled = unit.asDiagonal() * H * unit.asDiagonal();
+  const MatrixXd inverse = unit.asDiagonal() *
+                           scaled.ldlt().solve(MatrixXd::Identity(H.rows(), H.cols())) *
+                           unit.asDiagonal();
+  Matrix15 covariance = Matrix15::Zero();
+  const Index pose = at.OffsetOf({frame.id, false});
+  covariance.topLeftCorner<6, 6>() = inverse.block<6, 6>(pose, pose);
+  if (frame.inertial) {
+    const Index motion = at.OffsetOf({frame.id, true});
+    covariance.bottomRightCorner<9, 9>() = inverse.block<9, 9>(motion, motion);
+    covariance.topRightCorner<6, 9>() = inverse.block<6, 9>(pose, motion);
+    covariance.bottomLeftCorner<9, 6>() = inverse.block<9, 6>(motion, pose);
+  }
+  return covariance;
+}
+
+}  // namespace sgf::vio
