@@ -28,6 +28,39 @@ inline Eigen::Vector3d LogSO3(const Eigen::Quaterniond& q) {
   return sign * scale * q.vec();
 }
 
+/// The matrix of the cross product with w: HatSO3(w) x = w.cross(x).
+inline Eigen::Matrix3d HatSO3(const Eigen::Vector3d& w) {
+  Eigen::Matrix3d m;
+  m << 0, -w.z(), w.y(), w.z(), 0, -w.x(), -w.y(), w.x(), 0;
+  return m;
+}
+
+/// Jr with Exp(w + d) = Exp(w) Exp(Jr d) to first order in d (Forster et al., "On-manifold
+/// preintegration for real-time visual-inertial odometry", 2017, equation 8).
+inline Eigen::Matrix3d RightJacobianSO3(const Eigen::Vector3d& w) {
+  const double square = w.squaredNorm(), angle = std::sqrt(square);
+  // (1 - cos x)/x^2 and (x - sin x)/x^3 to the order at which the next term is below double
+  // precision; the closed forms cancel at small angles.
+  const bool small = angle < 0.02;
+  const double half_sinc = small ? 0 : std::sin(0.5 * angle) / angle;
+  const double first =
+      small ? 0.5 - square / 24 + square * square / 720 : 2 * half_sinc * half_sinc;
+  const double second = small ? 1.0 / 6 - square / 120 + square * square / 5040
+                              : (angle - std::sin(angle)) / (square * angle);
+  const Eigen::Matrix3d hat = HatSO3(w);
+  return Eigen::Matrix3d::Identity() - first * hat + second * hat * hat;
+}
+
+/// The inverse of RightJacobianSO3(w), for rotations of less than a full turn: Log(Exp(w) Exp(d)) =
+/// w + Jr^-1 d to first order in d (Forster et al., equation 9).
+inline Eigen::Matrix3d InverseRightJacobianSO3(const Eigen::Vector3d& w) {
+  const double square = w.squaredNorm(), half = 0.5 * std::sqrt(square);
+  const double second = half < 0.01 ? 1.0 / 12 + square / 720 + square * square / 30240
+                                    : (1 - half / std::tan(half)) / square;
+  const Eigen::Matrix3d hat = HatSO3(w);
+  return Eigen::Matrix3d::Identity() + 0.5 * hat + second * hat * hat;
+}
+
 /// A rigid motion: rotation R and translation p (m), as unit quaternion and vector.
 struct SE3 {
   Eigen::Quaterniond R = Eigen::Quaterniond::Identity();  ///< of unit norm

@@ -68,6 +68,29 @@ TEST(SE3, LogOfMoreThanHalfATurnGoesTheShortWay) {
   EXPECT_NEAR((LogSO3(ExpSO3(1.5 * kPi * axis)) + 0.5 * kPi * axis).norm(), 0, 1e-15);
 }
 
+TEST(SE3, HatIsTheCrossProduct) {
+  const Eigen::Vector3d w(1, -2, 3), x(0.3, 0.5, -0.7);
+  EXPECT_EQ(HatSO3(w) * x, w.cross(x));
+}
+
+TEST(SE3, RightJacobianIsTheDerivativeOfExp) {
+  for (const auto& axis : Axes())
+    for (const double angle : {0.0, 1e-7, 0.0199, 0.0201, 0.1, 1.0, 3.0}) {
+      const Eigen::Vector3d w = angle * axis;
+      Eigen::Matrix3d numeric;
+      constexpr double kStep = 1e-5;
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d d = kStep * Eigen::Vector3d::Unit(k);
+        numeric.col(k) = LogSO3(ExpSO3(w - d).conjugate() * ExpSO3(w + d)) / (2 * kStep);
+      }
+      EXPECT_LT((RightJacobianSO3(w) - numeric).norm(), 1e-9) << "angle " << angle;
+      EXPECT_LT(
+          (RightJacobianSO3(w) * InverseRightJacobianSO3(w) - Eigen::Matrix3d::Identity()).norm(),
+          3e-14)
+          << "angle " << angle;
+    }
+}
+
 TEST(SE3, ProductAndInverseAreThoseOfTheMatrices) {
   for (int i = 0; i < 20; ++i) {
     const SE3 a = SomeMotion(2 * i), b = SomeMotion(2 * i + 1);
