@@ -17,7 +17,10 @@ ALLOWED = {
     "alignment": {"core", "metrics"},
     "odometry": {"core", "metrics", "stereo", "alignment"},
     "direct": {"core", "metrics", "alignment"},
-    "apps": {"core", "metrics", "stereo", "alignment", "odometry", "direct", "io", "eval", "synth"},
+    "flow": {"core", "metrics", "alignment"},
+    "apps": {
+        "core", "metrics", "stereo", "alignment", "odometry", "direct", "flow", "io", "eval", "synth",
+    },
 }
 
 
