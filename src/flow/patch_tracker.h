@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -59,6 +60,11 @@ class PatchTracker {
   ///   flat or has but one edge.
   virtual bool MakeTemplate(const Pyramid& image, const Eigen::Vector2f& centre,
                             PatchTemplate& patch) const = 0;
+
+  /// Where a patch, as it is, fits best at the coarsest level.
+  /// @param places px of the finest level, at least one.
+  virtual Eigen::Vector2f Likeliest(const PatchTemplate& patch, const Pyramid& image,
+                                    std::span<const Eigen::Vector2f> places) const = 0;
 
   /// Finds a patch in an image, from the coarsest level used to the finest.
   /// @param levels that are used, the finest ones.

@@ -84,12 +84,6 @@ bool Rotate(const Camera& camera, const Eigen::Quaterniond& R_cur_last, const Ve
   return true;
 }
 
-float Median(std::vector<float>& values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 struct Track {
   std::int64_t id = 0;
   Vector2f left = Vector2f::Zero();
@@ -113,6 +107,7 @@ void CheckOptions(const FlowOptions& o) {
   RequireRange("least_fast_threshold", o.least_fast_threshold, 1, 255);
   RequireRange("fast_threshold", o.fast_threshold, o.least_fast_threshold, 255);
   RequireRange("max_backward_px", o.max_backward_px, 0, 1e6);
+  RequireRange("max_disparity_px", o.max_disparity_px, 0, 1e6);
   RequireRange("max_epipolar_error", o.max_epipolar_error, 0, 2);
   ResolveThreads(o.threads);
 }
@@ -247,31 +242,36 @@ class StereoFlow::Impl {
   }
 
   void MatchAll(bool has_right) {
-    const Vector2f typical = TypicalDisparity();
     ParallelForBatches(int(tracks_.size()), options_.threads, [&](int k) {
       Track& track = tracks_[size_t(k)];
       track.right.reset();
-      if (has_right) Match(typical, track);
+      if (has_right) Match(track);
     });
   }
 
-  /// Median of the disparities known, px: where a point without one is searched first.
-  Vector2f TypicalDisparity() const {
-    std::vector<float> x, y;
-    for (const Track& track : tracks_)
-      if (track.disparity) {
-        x.push_back(track.disparity->x());
-        y.push_back(track.disparity->y());
-      }
-    return x.empty() ? Vector2f(0, 0) : Vector2f(Median(x), Median(y));
-  }
-
-  void Match(const Vector2f& typical, Track& track) const {
-    const bool known = track.disparity.has_value();
-    track.right = known ? MatchFrom(track, *track.disparity, options_.stereo_levels) : std::nullopt;
-    if (!track.right) track.right = MatchFrom(track, typical, options_.levels);
+  void Match(Track& track) const {
+    if (track.disparity) track.right = MatchFrom(track, *track.disparity, options_.stereo_levels);
+    if (!track.right) track.right = Search(track);
     track.disparity.reset();
     if (track.right) track.disparity = *track.right - track.left;
+  }
+
+  /// Looks along the epipolar line, from infinity on, in steps that are a pixel at the coarsest
+  /// level, and goes on from the place that fits best.
+  std::optional<Vector2f> Search(const Track& track) const {
+    std::vector<Vector2f> places;
+    const auto ray = rig_.left.TryUnproject(track.left.cast<double>());
+    if (!ray) return std::nullopt;
+    const SE3 T_right_left = rig_.T_left_right.Inverse();
+    const double step_px = 1 << (options_.levels - 1);
+    const double step = step_px / (rig_.right.fx * rig_.T_left_right.p.norm());  // 1/m
+    for (int k = 0; k * step_px <= options_.max_disparity_px; ++k) {
+      const Vector3d point = T_right_left.R * *ray + k * step * T_right_left.p;
+      if (point.z() > 0) places.push_back(rig_.right.Project(point).cast<float>());
+    }
+    if (places.empty()) return std::nullopt;
+    const Vector2f place = tracker_->Likeliest(*track.patch, right_, places);
+    return MatchFrom(track, place - track.left, options_.levels);
   }
 
   std::optional<Vector2f> MatchFrom(const Track& track, const Vector2f& disparity,

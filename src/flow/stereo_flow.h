@@ -37,6 +37,7 @@ struct FlowOptions {
   int least_fast_threshold = 5;
   double max_backward_px = 0.2;
   double max_epipolar_error = 0.005;
+  double max_disparity_px = 100;
   int threads = 1;
 
   template <class V>
@@ -48,7 +49,8 @@ struct FlowOptions {
     visit("stereo_levels", stereo_levels, "",
           "of these, the finest ones that a match starts from where the last disparity is known");
     visit("max_iterations", max_iterations, "", "at a level");
-    visit("tolerance_px", tolerance_px, "px", "step that ends the iterations at a level");
+    visit("tolerance_px", tolerance_px, "px",
+          "step that ends the iterations at the finest level; ten times that at the coarser ones");
     visit("cell_px", cell_px, "px", "side of the grid's cells; an empty one gets a new track");
     visit("border_px", border_px, "px", "around the grid, where no track begins");
     visit("fast_threshold", fast_threshold, "grey levels", "of the corners looked for first");
@@ -58,6 +60,8 @@ struct FlowOptions {
           "from a point to where it is found when followed there and back, else it is lost");
     visit("max_epipolar_error", max_epipolar_error, "",
           "distance of a right point's unit ray from the epipolar plane, else it is dropped");
+    visit("max_disparity_px", max_disparity_px, "px",
+          "how far a point is searched along its epipolar line where it has no disparity yet");
     visit("threads", threads, "", "0 for all cores; the result does not depend on it");
   }
 };
