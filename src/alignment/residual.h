@@ -36,8 +36,10 @@ template <class T>
 SGF_ALWAYS_INLINE metrics::Sample<T> CarrySample(const Eigen::Array<T, 4, 1>& channels,
                                                  const Eigen::Matrix<T, 2, 2>& A) {
   const Vector2<T> carried = A.transpose() * GradientOf(channels);
+  // Row by row: Eigen's own sum of four floats keeps loops over pixels from becoming SIMD code.
+  const T norm2 = A.row(0).squaredNorm() + A.row(1).squaredNorm();
   return metrics::MakeSample<T>(channels[kIntensity], carried.x(), carried.y(),
-                                static_cast<double>(channels[kEpsilon] * A.squaredNorm() / T(2)));
+                                static_cast<double>(channels[kEpsilon] * norm2 / T(2)));
 }
 
 /// Derivative by the warp's parameters of what changes by d_intensity and by w with a sample's

@@ -50,6 +50,11 @@ class NormalEquations {
   using Row = Eigen::Matrix<T, kRow, 1>;
   void AddRow(const Row& row, T weight) { sum_.noalias() += row * (weight * row).transpose(); }
 
+  /// The same for many residuals, gathered elsewhere: the upper left P + 1 rows and columns.
+  void AddSum(const Eigen::Matrix<T, P + 1, P + 1>& sum) {
+    sum_.template topLeftCorner<P + 1, P + 1>() += sum;
+  }
+
   void AddCost(double cost, int residuals) {
     cost_ += cost;
     residuals_ += residuals;

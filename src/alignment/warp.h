@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <sgf/core/always_inline.h>
 #include <sgf/core/camera.h>
 #include <sgf/core/se3.h>
 
@@ -101,19 +102,38 @@ struct PlanarWarp {
   T angle = T(0);                          ///< rad
   T log_scale = T(0);
 
-  bool At(const Input& offset, Point& point) const {
+  /// dW/du, the same everywhere.
+  Eigen::Matrix<T, 2, 2> Linear() const {
     using std::cos, std::exp, std::sin;
     const T scale = kScaled ? T(exp(log_scale)) : T(1);
     const T c = scale * cos(angle), s = scale * sin(angle);
-    point.a << c, -s, s, c;
-    point.arm = point.a * offset;
-    point.pixel = centre + point.arm;
+    Eigen::Matrix<T, 2, 2> a;
+    a << c, -s, s, c;
+    return a;
+  }
+
+  bool At(const Input& offset, Point& point) const {
+    Place(offset, Linear(), point);
     return true;
+  }
+  /// The same with Linear() at hand: sines and cosines are taken once for all pixels of a patch.
+  SGF_ALWAYS_INLINE void Place(const Input& offset, const Eigen::Matrix<T, 2, 2>& linear,
+                               Point& point) const {
+    point.a = linear;
+    point.arm = linear * offset;
+    point.pixel = centre + point.arm;
   }
   void Update(const Parameters& delta) {
     centre += delta.template head<2>();
     angle += delta(2);
     if constexpr (kScaled) log_scale += delta(3);
+  }
+  /// Goes back by a step of the reference: W <- W o W(delta)^-1, for derivatives that were taken at
+  /// the reference (inverse-compositional; Baker, Matthews, "Lucas-Kanade 20 years on", 2004).
+  void UpdateInverse(const Parameters& delta) {
+    angle -= delta(2);
+    if constexpr (kScaled) log_scale -= delta(3);
+    centre -= Linear() * delta.template head<2>();
   }
 };
 

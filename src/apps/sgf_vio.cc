@@ -64,7 +64,7 @@ class EventLog {
   void Close() { file_.Commit(); }
 
  private:
-  void Write(int frame, const vio::VioFrameResult& result, const char* event,
+  void Write(int frame, const vio::VioFrameResult& result, const std::string& event,
              nlohmann::ordered_json more) {
     nlohmann::ordered_json line = {{"frame", frame},
                                    {"time_ns", result.time_ns},
@@ -108,7 +108,7 @@ class PointFile {
 struct Run {
   std::vector<vio::VioFrameResult> frames;
   int dropped = 0;
-  ImuHealth imu;
+  vio::ImuHealth imu;
 };
 
 bool HasState(const vio::VioFrameResult& frame) {

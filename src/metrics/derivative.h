@@ -65,9 +65,14 @@ inline Vector2<T> UnitGradient(const Sample<T>& sample) {
 /// d a / d g = (I - a a^T) / sqrt(||g||^2 + epsilon), from eq. 7; 0 where a is 0 by definition.
 template <class T>
 inline Eigen::Matrix<T, 2, 2> NormalizedGradientJacobian(const Sample<T>& sample) {
-  if (!(sample.reg_norm > T(0))) return Eigen::Matrix<T, 2, 2>::Zero();
-  const Vector2<T> a = NormalizedGradient(sample);
-  return (Eigen::Matrix<T, 2, 2>::Identity() - a * a.transpose()) / sample.reg_norm;
+  // Number by number and without a branch, so that loops over pixels become SIMD code.
+  const T length = sample.reg_norm > T(0) ? sample.reg_norm : std::numeric_limits<T>::infinity();
+  Eigen::Matrix<T, 2, 2> jacobian;
+  jacobian(0, 0) = (T(1) - sample.ax * sample.ax) / length;
+  jacobian(0, 1) = (T(0) - sample.ax * sample.ay) / length;
+  jacobian(1, 0) = (T(0) - sample.ay * sample.ax) / length;
+  jacobian(1, 1) = (T(1) - sample.ay * sample.ay) / length;
+  return jacobian;
 }
 
 /// d min(r_i, r_j) / d a_i: -2 r_i^2 a_i where ||a_i||^2 is the largest of (||a_i||^2, ||a_j||^2,

@@ -71,9 +71,9 @@ class StereoInertialOdometry::Impl {
     if (window_.frames.empty()) Begin(frame);
     window_.frames.push_back(std::move(frame));
     Observe(seen);
+    const bool blind = window_.frames.size() > 1 && CountSeen() < options_.least_sights;
+    if (NeedsKeyframe(seen)) MakeKeyframe(seen, result);
     result.landmarks = CountSeen();
-    const bool blind = window_.frames.size() > 1 && result.landmarks < options_.least_sights;
-    if (!blind && NeedsKeyframe(seen, result.landmarks)) MakeKeyframe(seen, result);
     Refine(blind, result);
     result.times.refinement_s = stage.Lap();
     if (result.state == VioState::kLost)
@@ -219,10 +219,10 @@ class StereoInertialOdometry::Impl {
     return count;
   }
 
-  bool NeedsKeyframe(const flow::FlowFrame& seen, int landmarks) const {
+  bool NeedsKeyframe(const flow::FlowFrame& seen) const {
     if (window_.frames.size() == 1) return true;
     if (seen.observations.empty()) return false;
-    const double share = landmarks / static_cast<double>(seen.observations.size());
+    const double share = CountSeen() / static_cast<double>(seen.observations.size());
     return share < options_.keyframe_share && since_keyframe_ + 1 >= options_.keyframe_gap;
   }
 

@@ -17,9 +17,12 @@ ALLOWED = {
     "alignment": {"core", "metrics"},
     "odometry": {"core", "metrics", "stereo", "alignment"},
     "direct": {"core", "metrics", "alignment"},
+    "flow": {"core", "metrics", "alignment"},
     "vio": {"core", "metrics", "alignment", "flow"},
-    "apps": {"core", "metrics", "stereo", "alignment", "odometry", "direct", "vio", "io", "eval",
-             "synth"},
+    "apps": {
+        "core", "metrics", "stereo", "alignment", "odometry", "direct", "flow", "vio", "io", "eval",
+        "synth",
+    },
 }
 
 
