@@ -116,32 +116,48 @@ BodyState AtPose(const TimedPose& pose, const Vector3d& gyro_bias) {
   return state;
 }
 
+// Covariance of the motions' rotation residuals. The error of a visual rotation is in the residual
+// before it and, turned and with the other sign, in the one after it; that the two take each other
+// back makes the bias about twice as well known as independent residuals would.
+MatrixXd RotationCovariance(std::span<const TimedPose> poses,
+                            std::span<const Preintegration> motions, double visual_sd_rad) {
+  const double visual = visual_sd_rad * visual_sd_rad;
+  const Eigen::Index n = static_cast<Eigen::Index>(motions.size());
+  MatrixXd C = MatrixXd::Zero(3 * n, 3 * n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    C.block<3, 3>(3 * k, 3 * k) =
+        motions[k].covariance().topLeftCorner<3, 3>() + 2 * visual * Matrix3d::Identity();
+    if (k == 0) continue;
+    const Matrix3d R = (poses[k].pose.R.conjugate() * poses[k + 1].pose.R).toRotationMatrix();
+    C.block<3, 3>(3 * k - 3, 3 * k) = -visual * R;
+    C.block<3, 3>(3 * k, 3 * k - 3) = -visual * R.transpose();
+  }
+  return C;
+}
+
 // Gauss-Newton on the rotations alone.
 GyroFit FitGyroscope(std::span<const TimedPose> poses, std::span<const Preintegration> motions,
                      const InertialInitializerOptions& options) {
+  const Eigen::LLT<MatrixXd> noise(
+      RotationCovariance(poses, motions, options.visual_rotation_sd_rad));
+  const Eigen::Index n = static_cast<Eigen::Index>(motions.size());
   GyroFit fit;
   fit.bias = motions[0].linearization().gyro;
   constexpr int kIterations = 5;
   for (int iteration = 0; iteration <= kIterations; ++iteration) {
-    Matrix3d H = Matrix3d::Zero();
-    Vector3d b = Vector3d::Zero();
-    double squares = 0;
-    for (size_t k = 0; k < motions.size(); ++k) {
+    MatrixXd J(3 * n, 3);
+    VectorXd r(3 * n);
+    for (Eigen::Index k = 0; k < n; ++k) {
       StateMatrix J_from;
-      const Vector3d r = motions[k]
-                             .Residual(AtPose(poses[k], fit.bias), AtPose(poses[k + 1], fit.bias),
-                                       options.gravity, &J_from)
-                             .segment<3>(kRotation);
-      const Matrix3d J = J_from.block<3, 3>(kRotation, kGyroBias);
-      const double sd = options.visual_rotation_sd_rad;
-      const double weight = 1 / (2 * sd * sd + motions[k].covariance()(kRotation, kRotation));
-      H += weight * J.transpose() * J;
-      b += weight * J.transpose() * r;
-      squares += r.squaredNorm();
+      const StateVector residual = motions[k].Residual(
+          AtPose(poses[k], fit.bias), AtPose(poses[k + 1], fit.bias), options.gravity, &J_from);
+      r.segment<3>(3 * k) = residual.segment<3>(kRotation);
+      J.middleRows<3>(3 * k) = J_from.block<3, 3>(kRotation, kGyroBias);
     }
-    fit.error_rad = std::sqrt(squares / static_cast<double>(motions.size()));
-    fit.sd = H.inverse().diagonal().cwiseSqrt();
-    if (iteration < kIterations) fit.bias -= H.ldlt().solve(b);
+    const Matrix3d covariance = (J.transpose() * noise.solve(J)).inverse();
+    fit.error_rad = std::sqrt(r.squaredNorm() / static_cast<double>(n));
+    fit.sd = covariance.diagonal().cwiseSqrt();
+    if (iteration < kIterations) fit.bias -= covariance * (J.transpose() * noise.solve(r));
   }
   return fit;
 }
@@ -242,8 +258,9 @@ class MotionEquations {
     fit.accel_bias = x.tail<3>();
     fit.accel_bias_sd = covariance.diagonal().tail<3>().cwiseSqrt();
     fit.gravity_covariance = covariance.topLeftCorner(m, m);
-    // At the minimum the weighted squares are c - b^T x.
-    fit.error = std::sqrt(std::max(0.0, squares_ - b_.dot(x)) / rows_);
+    // At the minimum the weighted squares are c - b^T x. Velocities take up half of the rows.
+    fit.error =
+        std::sqrt(std::max(0.0, squares_ - b_.dot(x)) / (rows_ - static_cast<double>(gravity_at_)));
     return fit;
   }
 

@@ -45,7 +45,7 @@ struct InertialInitializerOptions {
   double visual_position_sd_m = 0.005;
   double accel_bias_sd = 0.2;
   double max_tilt_sd_rad = 0.05;
-  double max_motion_error = 4;
+  double max_motion_error = 2.5;
 
   template <class V>
   void VisitFields(V&& visit) {
@@ -80,7 +80,7 @@ struct InertialInitialisation {
   double gravity = 0;             ///< its magnitude as measured, m/s^2
   double tilt_sd_rad = 0;         ///< standard deviation of its direction, in the worst direction
   double rotation_error_rad = 0;  ///< RMS of the gyroscope's rotations against the visual ones
-  double motion_error = 0;        ///< RMS of the motion's residuals in their expected sigmas
+  double motion_error = 0;        ///< of the motion against the accelerometer; about 1 is expected
   Eigen::Vector3d gyro_bias_sd = Eigen::Vector3d::Zero();   ///< rad/s
   Eigen::Vector3d accel_bias_sd = Eigen::Vector3d::Zero();  ///< m/s^2; that of the options where
                                                             ///< the motion does not show the bias

@@ -285,9 +285,12 @@ TEST(InitializeMoving, DetectsWrongUnitsAndAxes) {
 TEST(InitializeMoving, DetectsPosesOfTheWrongScaleOrTime) {
   const VisualFlight flight(LivelyRide(), 0, 4, 0);
   VisualFlight large = flight;
-  for (TimedPose& pose : large.poses) pose.pose.p *= 2;
-  const auto result = large.Initialize();
-  EXPECT_EQ(result.problem, Problem::kMotionDisagrees) << result.motion_error;
+  for (TimedPose& pose : large.poses) pose.pose.p *= 3;
+  EXPECT_EQ(large.Initialize().problem, Problem::kMotionDisagrees);
+  VisualFlight late = VisualFlight(AggressiveRide(), 0, 4, 0);
+  late.poses.pop_back();
+  for (TimedPose& pose : late.poses) pose.time_ns += 50'000'000;
+  EXPECT_NE(late.Initialize().problem, Problem::kNone);
 }
 
 TEST(InitializeMoving, WantsEnoughPosesWithoutGaps) {
