@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <string>
 #include <vector>
@@ -143,7 +142,7 @@ struct VisualFlight : Flight {
   template <class F>
   InertialInitialisation Initialize(F change,
                                     const InertialInitializerOptions& options = {}) const {
-    ImuBuffer buffer({}, Unlimited());
+    ImuBuffer buffer({});
     for (ImuSample sample : samples) {
       change(sample);
       buffer.Add(sample);
@@ -153,13 +152,6 @@ struct VisualFlight : Flight {
 
   InertialInitialisation Initialize() const {
     return Initialize([](ImuSample&) {});
-  }
-
-  // In degrees a second, rates are beyond the full scale in radians.
-  static ImuBufferOptions Unlimited() {
-    ImuBufferOptions options;
-    options.gyro_full_scale = options.accel_full_scale = std::numeric_limits<double>::infinity();
-    return options;
   }
 
   std::vector<TimedPose> poses;
