@@ -221,9 +221,13 @@ TEST(Preintegration, CovarianceIsThatOfMonteCarlo) {
   for (int k = 0; k < 9; ++k) EXPECT_NEAR(sum9(k, k) / predicted(k, k), 1, 4 * 0.063) << k;
 }
 
-TEST(Preintegration, InformationOfASingleStepIsFinite) {
+// White noise of density s over h seconds moves a body by s sqrt(h^3 / 12) more or less than half
+// the change of its velocity says.
+TEST(Preintegration, InformationOfASingleStepIsThatOfContinuousNoise) {
   const Flight flight(SmoothRide(), 0, 0.01, NoiseFree());
-  EXPECT_TRUE(flight.Integrate(0, 1, {}).SquareRootInformation().allFinite());
+  const StateMatrix W = flight.Integrate(0, 1, {}).SquareRootInformation();
+  const double sd = ImuNoise().accelerometer_noise_density * std::sqrt(1.25e-7 / 12);
+  EXPECT_NEAR(W.col(kPosition).norm() * sd, 1, 1e-3);
 }
 
 TEST(Preintegration, RaisesTheNoiseOfAStretchAsTold) {
