@@ -57,8 +57,8 @@ class Preintegration {
 
   /// Adds the time between two samples. Where the stretch before is not much shorter, a parabola
   /// through the three samples is integrated, otherwise a straight line: Magnus' series to fourth
-  /// order for the rotation, Simpson's rule for the velocity. (Euler's rule is off by
-  /// decimetres in 10 s, and the mean of two samples by 0.01 deg in an aggressive flight.)
+  /// order for the rotation, Simpson's rule for the velocity. (The mean of two samples is off by
+  /// 0.01 deg in an aggressive flight; see tests/support/imu_integration.h.)
   /// @throws Error if `begin` is not at to_ns(), `end` not after it, or a number is not finite.
   void Integrate(const ImuSample& begin, const ImuSample& end, const NoiseFactors& factors = {});
 
