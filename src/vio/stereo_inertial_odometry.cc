@@ -38,10 +38,7 @@ void CheckOptions(const VioOptions& options) {
   require(options.least_parallax > 0, "least_parallax", options.least_parallax, "positive");
   require(options.least_sights >= 3, "least_sights", options.least_sights, "at least 3");
   require(options.blind_s >= 0, "blind_s", options.blind_s, "at least 0");
-  require(options.gyro_bias_sigma > 0, "gyro_bias_sigma", options.gyro_bias_sigma, "positive");
-  require(options.accel_bias_sigma > 0, "accel_bias_sigma", options.accel_bias_sigma, "positive");
-  require(options.rest_accel_sigma > 0, "rest_accel_sigma", options.rest_accel_sigma, "positive");
-  require(options.rest_gyro > 0, "rest_gyro", options.rest_gyro, "positive");
+  require(options.start_s > 0, "start_s", options.start_s, "positive");
   require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
@@ -69,20 +66,24 @@ class StereoInertialOdometry::Impl {
     result.tracks = static_cast<int>(seen.observations.size());
     result.stereo_tracks = seen.stereo;
     if (window_.frames.empty()) Begin(frame);
+    if (inertial_ && !frame.inertial) inertial_ = false;  // measurements are missing
     window_.frames.push_back(std::move(frame));
     Observe(seen);
     const bool blind = window_.frames.size() > 1 && CountSeen() < options_.least_sights;
     if (NeedsKeyframe(seen)) MakeKeyframe(seen, result);
     result.landmarks = CountSeen();
     Refine(blind, result);
+    ToWorld(result);
     result.times.refinement_s = stage.Lap();
-    if (result.state == VioState::kLost)
+    if (result.state == VioState::kLost) {
       Lose();
-    else
+    } else {
+      if (options_.inertial && !inertial_) Start(result);
       Marginalize();
-    imu_.DropBefore(time_ns);
+    }
+    imu_.DropBefore(start_.empty() ? time_ns : start_.front().time_ns);
+    result.inertial = inertial_;
     result.times.marginalization_s = stage.Lap();
-    result.body = last_;
     result.times.total_s = total.Lap();
     return result;
   }
@@ -122,13 +123,17 @@ class StereoInertialOdometry::Impl {
     if (frame.since_last && last->inertial) {
       frame.state = frame.since_last->Predict(last->state, options_.window.gravity);
       frame.inertial = true;
-    } else if (window_.frames.size() >= 2) {
+      return frame;
+    }
+    if (window_.frames.size() >= 2) {
       const BodyState& before = window_.frames[window_.frames.size() - 2].state;
       const double share = static_cast<double>(time_ns - last->state.time_ns) /
                            static_cast<double>(last->state.time_ns - before.time_ns);
       const SE3 motion = before.T_world_body.Inverse() * last->state.T_world_body;
       frame.state.T_world_body = last->state.T_world_body * Part(motion, share);
     }
+    if (frame.since_last)
+      frame.state.T_world_body.R = last->state.T_world_body.R * frame.since_last->delta_R();
     return frame;
   }
 
@@ -142,42 +147,71 @@ class StereoInertialOdometry::Impl {
 
   // --- Begin ---
 
-  /// The first frame of a map. Its attitude is what the accelerometer says, if there is one.
+  /// The first frame of a map. Its attitude is what the accelerometer says, if there is one, until
+  /// the inertial sensor takes part.
   void Begin(Frame& frame) {
-    constexpr double kHeld = 1e-4;
-    StateVector sigmas = StateVector::Constant(kHeld);
-    if (options_.inertial && !imu_.samples().empty()) {
-      const bool rest = StartFromGravity(frame.state);
-      frame.inertial = true;
-      sigmas.segment<2>(kRotation).setConstant(rest ? 0.03 : 0.2);
-      sigmas.segment<3>(kVelocity).setConstant(rest ? 0.05 : 3);
-      sigmas.segment<3>(kGyroBias).setConstant(options_.gyro_bias_sigma);
-      sigmas.segment<3>(kAccelBias).setConstant(options_.accel_bias_sigma);
+    if (options_.inertial && segment_ == 0 && !imu_.samples().empty()) {
+      Vector3d accel = Vector3d::Zero();
+      for (const ImuSample& sample : imu_.samples()) accel += sample.accel;
+      const Vector3d up = frame.state.T_world_body.R * accel;
+      frame.state.T_world_body.R =
+          (Eigen::Quaterniond::FromTwoVectors(up, Vector3d::UnitZ()) * frame.state.T_world_body.R)
+              .normalized();
     }
     frame.keyframe = true;
-    window_.Anchor(frame, sigmas);
+    start_.clear();
+    window_.AnchorPose(frame, Eigen::Matrix<double, kPoseParameters, 1>::Constant(kHeld));
   }
 
-  /// Attitude from the mean acceleration.
-  /// @return whether the body is at rest.
-  bool StartFromGravity(BodyState& state) const {
-    Vector3d accel = Vector3d::Zero(), gyro = Vector3d::Zero();
-    const auto n = static_cast<double>(imu_.samples().size());
-    for (const ImuSample& sample : imu_.samples()) {
-      accel += sample.accel / n;
-      gyro += sample.gyro / n;
+  /// Lets the inertial sensor take part as soon as it can be told where down is.
+  void Start(VioFrameResult& result) {
+    start_.push_back({result.time_ns, window_.frames.back().state.T_world_body});
+    const double span_s = 1e-9 * static_cast<double>(result.time_ns - start_.front().time_ns);
+    const auto states = static_cast<size_t>(options_.states);
+    if (span_s < options_.start_s || window_.frames.size() < states) return;
+    InertialInitialisation found =
+        InitializeAtRest(imu_, start_.front().time_ns, result.time_ns, options_.start);
+    if (found.ok()) {
+      BodyState rest = found.states.back();
+      found.states.assign(start_.size(), rest);  // the same all the time
+      found.T_world_visual = {};  // the first attitude is that of rest
+    } else {
+      found = InitializeMoving(start_, imu_, options_.start);
     }
-    double accel_spread = 0, gyro_spread = 0;
-    for (const ImuSample& sample : imu_.samples()) {
-      accel_spread += (sample.accel - accel).squaredNorm() / n;
-      gyro_spread += (sample.gyro - gyro).squaredNorm() / n;
+    result.problem = found.problem;
+    constexpr double kLongest = 5;  // times the span: what came first is not needed for ever
+    if (!found.ok() && span_s > kLongest * options_.start_s) start_.erase(start_.begin());
+    if (found.ok()) TakeOver(found);
+  }
+
+  void TakeOver(const InertialInitialisation& found) {
+    const size_t first = window_.frames.size() - static_cast<size_t>(options_.states);
+    window_.DropPrior();
+    const BodyState& last_found = found.states.back();
+    for (size_t k = 0; k < window_.frames.size(); ++k) {
+      Frame& frame = window_.frames[k];
+      frame.state.T_world_body = found.T_world_visual * frame.state.T_world_body;
+      if (k < first) continue;
+      frame.inertial = true;
+      frame.state.velocity = found.states[found.states.size() - (window_.frames.size() - k)].velocity;
+      frame.state.gyro_bias = last_found.gyro_bias;
+      frame.state.accel_bias = last_found.accel_bias;
+      if (k > first)
+        frame.since_last = imu_.Between(window_.frames[k - 1].state.time_ns, frame.state.time_ns,
+                                        BiasOf(frame.state));
     }
-    state.T_world_body.R = Eigen::Quaterniond::FromTwoVectors(accel, Vector3d::UnitZ());
-    constexpr double kLeastSamples = 10;
-    const bool rest = n >= kLeastSamples && std::sqrt(accel_spread) < options_.rest_accel_sigma &&
-                      std::sqrt(gyro_spread) < options_.rest_gyro;
-    state.gyro_bias = rest ? gyro : Vector3d::Zero();
-    return rest;
+    Eigen::Matrix<double, kPoseParameters, 1> pose;
+    pose.setConstant(kHeld);
+    pose.head<2>().setConstant(found.tilt_sd_rad);
+    window_.AnchorPose(window_.frames.front(), pose);
+    constexpr double kVelocitySigma = 0.2;  // m/s
+    Eigen::Matrix<double, kMotionParameters, 1> motion;
+    motion << Vector3d::Constant(kVelocitySigma), found.gyro_bias_sd, found.accel_bias_sd;
+    window_.AnchorMotion(window_.frames[first], motion);
+    inertial_ = true;
+    start_.clear();
+    R_gravity_world_ = found.T_world_visual.R * R_gravity_world_;
+    last_ = window_.frames.back().state;
   }
 
   // --- Every frame ---
@@ -281,10 +315,24 @@ class StereoInertialOdometry::Impl {
                                                         : VioState::kTracked;
       last_sight_ns_ = newest.state.time_ns;
     }
+    result.body = last_;
+    result.body.time_ns = result.time_ns;
     if (result.state == VioState::kLost) return;
     since_keyframe_ = result.new_keyframe ? 0 : since_keyframe_ + 1;
     last_ = newest.state;
+    result.body = last_;
     if (options_.covariance) result.covariance = window_.CovarianceOf(newest);
+  }
+
+  /// From the window's world, whose z points up, to that of the trajectory.
+  void ToWorld(VioFrameResult& result) const {
+    result.R_gravity_world = R_gravity_world_;
+    const Eigen::Quaterniond R = R_gravity_world_.conjugate();
+    result.body.T_world_body = SE3{R, {0, 0, 0}} * result.body.T_world_body;
+    result.body.velocity = R * result.body.velocity;
+    StateMatrix turn = StateMatrix::Identity();
+    for (const int at : {kPosition, kVelocity}) turn.block<3, 3>(at, at) = R.toRotationMatrix();
+    result.covariance = turn * result.covariance * turn.transpose();
   }
 
   /// A new map begins at the last believed state.
@@ -292,6 +340,8 @@ class StereoInertialOdometry::Impl {
     for (const auto& [id, landmark] : window_.landmarks) finished_.push_back(ToPoint(landmark));
     window_ = Window(window_.rig(), options_.window, options_.threads);
     tracks_.clear();
+    inertial_ = false;
+    start_.clear();
     ++segment_;
     since_keyframe_ = 0;
   }
@@ -315,8 +365,12 @@ class StereoInertialOdometry::Impl {
       leaving.push_back(LeastUseful(keyframes));
     if (leaving.empty() && motions.empty()) return;
     const std::set<int> hosts(leaving.begin(), leaving.end());
-    for (const auto& [id, landmark] : window_.landmarks)
-      if (hosts.contains(landmark.host)) finished_.push_back(ToPoint(landmark));
+    for (const auto& [id, landmark] : window_.landmarks) {
+      if (!hosts.contains(landmark.host)) continue;
+      finished_.push_back(ToPoint(landmark));
+      // What its sights say is in the prior: a new landmark of the track must not say it again.
+      if (const auto track = tracks_.find(id); track != tracks_.end()) track->second.clear();
+    }
     std::erase_if(motions, [&](int id) { return hosts.contains(id); });
     window_.Marginalize(leaving, motions);
   }
@@ -355,7 +409,8 @@ class StereoInertialOdometry::Impl {
 
   VioPoint ToPoint(const Landmark& landmark) const {
     const SE3 T_world_cam = window_.PoseOf(*window_.Find(landmark.host), 0);
-    return {.position = T_world_cam * (landmark.ray.homogeneous() / landmark.inverse_depth),
+    return {.position = R_gravity_world_.conjugate() *
+                        (T_world_cam * (landmark.ray.homogeneous() / landmark.inverse_depth)),
             .inverse_depth = landmark.inverse_depth,
             .inverse_depth_variance = landmark.inverse_depth_variance,
             .support = static_cast<int>(landmark.sights.size()),
@@ -369,7 +424,11 @@ class StereoInertialOdometry::Impl {
   Window window_;
   std::map<std::int64_t, std::vector<LandmarkSight>> tracks_;  ///< of the newest frame, by id
   std::vector<VioPoint> finished_;
+  static constexpr double kHeld = 1e-4;  ///< rad, m: standard deviation of what is held
   BodyState last_;
+  Eigen::Quaterniond R_gravity_world_ = Eigen::Quaterniond::Identity();
+  bool inertial_ = false;        ///< the inertial sensor takes part
+  std::vector<TimedPose> start_;  ///< poses of images alone before that
   int next_id_ = 0;
   int since_keyframe_ = 0;
   int segment_ = 0;

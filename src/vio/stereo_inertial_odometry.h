@@ -15,6 +15,7 @@
 #include <sgf/core/se3.h>
 #include <sgf/flow/stereo_flow.h>
 #include <sgf/vio/imu_buffer.h>
+#include <sgf/vio/inertial_initializer.h>
 #include <sgf/vio/window.h>
 
 /// Stereo-inertial odometry (Usenko, Demmel, Schubert, Stückler, Cremers, "Visual-inertial mapping
@@ -34,10 +35,8 @@ struct VioOptions {
   double least_parallax = 0.01;
   int least_sights = 12;
   double blind_s = 2;
-  double gyro_bias_sigma = 0.1;
-  double accel_bias_sigma = 0.2;
-  double rest_accel_sigma = 0.3;
-  double rest_gyro = 0.05;
+  InertialInitializerOptions start;
+  double start_s = 1;
   bool covariance = true;
   int threads = 1;
 
@@ -56,11 +55,8 @@ struct VioOptions {
     visit("least_sights", least_sights, "",
           "landmarks seen that a frame needs; with fewer it is predicted or lost");
     visit("blind_s", blind_s, "s", "after so long without sight a new map is begun");
-    visit("gyro_bias_sigma", gyro_bias_sigma, "rad/s", "expected of the gyroscope's bias");
-    visit("accel_bias_sigma", accel_bias_sigma, "m/s^2", "expected of the accelerometer's bias");
-    visit("rest_accel_sigma", rest_accel_sigma, "m/s^2",
-          "at rest acceleration varies by less than this");
-    visit("rest_gyro", rest_gyro, "rad/s", "at rest the angular rate varies by less than this");
+    visit("start", start, "", "when the inertial sensor takes part, which images alone begin");
+    visit("start_s", start_s, "s", "of images alone before it is asked for the first time");
     visit("covariance", covariance, "", "state the covariance of every frame");
     visit("threads", threads, "", "0 for all cores. The result does not depend on it");
   }
@@ -71,7 +67,7 @@ void CheckOptions(const VioOptions& options);
 
 /// What became of a frame.
 enum class VioState {
-  kInitialising,  ///< waits for the inertial sensor
+  kInitialising,  ///< no landmarks yet
   kTracked,
   kPredicted,  ///< too little was seen: the inertial sensor alone
   kLost,       ///< no state
@@ -92,6 +88,11 @@ struct VioFrameResult {
   VioState state = VioState::kInitialising;
   int segment = 0;  ///< number of the map
   BodyState body = {};
+  /// World coordinates to those of a world whose z points up exactly; identity until it is found.
+  Eigen::Quaterniond R_gravity_world = Eigen::Quaterniond::Identity();
+  bool inertial = false;  ///< the inertial sensor takes part
+  /// Why not, where it was asked.
+  InitialisationProblem problem = InitialisationProblem::kNone;
   /// Of the state, in the order of Plus(). Of velocity and biases 0 without inertial sensor.
   StateMatrix covariance = StateMatrix::Zero();
   bool new_keyframe = false;
@@ -111,9 +112,10 @@ struct VioPoint {
   int segment = 0;
 };
 
-/// Odometry of a stereo camera and an inertial sensor. World has z up where the inertial sensor is
-/// used. Frames are handed over one at a time; a frame's pose is not changed later. Same input,
-/// same bits, for any number of threads. Memory does not grow with the sequence.
+/// Odometry of a stereo camera and an inertial sensor. Frames are handed over one at a time; a
+/// frame's pose is not changed later, nor is its world: z points up as the accelerometer has it
+/// when a map begins, and where up is found to be later is said apart (R_gravity_world). Same
+/// input, same bits, for any number of threads. Memory does not grow with the sequence.
 class StereoInertialOdometry {
  public:
   /// @param rig raw cameras. @param T_body_left left camera's coordinates to the body's.

@@ -327,17 +327,27 @@ SE3 Window::PoseOf(const Frame& frame, int camera) const {
   return frame.state.T_world_body * rig_.T_body_cam[camera];
 }
 
-void Window::Anchor(Frame& frame, const Vector15& sigmas) {
+void Window::AnchorPose(Frame& frame, const Eigen::Matrix<double, kPoseParameters, 1>& sigmas) {
   frame.linearization = frame.state;
   frame.in_prior = true;
-  const Vector15 weights = sigmas.cwiseInverse();
-  const BlockId pose{frame.id, false}, motion{frame.id, true};
-  MatrixXd S = weights.head<kPoseParameters>().asDiagonal();
+  const BlockId block{frame.id, false};
+  MatrixXd S = sigmas.cwiseInverse().asDiagonal();
   S.topLeftCorner<3, 3>() *= frame.state.T_world_body.R.toRotationMatrix();
-  prior_.Add(std::span(&pose, 1), S, VectorXd::Zero(kPoseParameters));
-  if (frame.inertial)
-    prior_.Add(std::span(&motion, 1), MatrixXd(weights.tail<kMotionParameters>().asDiagonal()),
-               VectorXd::Zero(kMotionParameters));
+  prior_.Add(std::span(&block, 1), S, VectorXd::Zero(kPoseParameters));
+}
+
+void Window::AnchorMotion(Frame& frame,
+                          const Eigen::Matrix<double, kMotionParameters, 1>& sigmas) {
+  frame.linearization = frame.state;
+  frame.in_prior = true;
+  const BlockId block{frame.id, true};
+  prior_.Add(std::span(&block, 1), MatrixXd(sigmas.cwiseInverse().asDiagonal()),
+             VectorXd::Zero(kMotionParameters));
+}
+
+void Window::DropPrior() {
+  prior_ = {};
+  for (Frame& frame : frames) frame.in_prior = false;
 }
 
 WindowSummary Window::Refine() {

@@ -104,10 +104,16 @@ class Window {
   /// T_world_cam of a frame's camera, as it is now.
   SE3 PoseOf(const Frame& frame, int camera) const;
 
-  /// Holds a frame's pose and, where it is inertial, motion to what they are now, with these
-  /// standard deviations in the order of Plus(), but rotations about the axes of the world: what
-  /// gravity tells has to be apart from what it does not.
-  void Anchor(Frame& frame, const Eigen::Matrix<double, 15, 1>& sigmas);
+  /// Holds a frame's pose to what it is now, with standard deviations of rotations (rad) about the
+  /// axes of the world, as what gravity tells has to be apart from what it does not, and of the
+  /// position (m).
+  void AnchorPose(Frame& frame, const Eigen::Matrix<double, kPoseParameters, 1>& sigmas);
+
+  /// Holds an inertial frame's velocity and biases, with standard deviations in their order.
+  void AnchorMotion(Frame& frame, const Eigen::Matrix<double, kMotionParameters, 1>& sigmas);
+
+  /// Forgets all that was known before, to be anchored anew.
+  void DropPrior();
 
   /// Refines all frames and landmarks.
   WindowSummary Refine();
