@@ -10,9 +10,9 @@ namespace sgf::flow::internal {
 std::optional<Eigen::Vector2f> StrongestCorner(const cv::Mat1b& grey, const cv::Rect& cell,
                                                const DetectionOptions& options) {
   constexpr int kReach = 3 + 1;  // px: FAST looks at a circle, its suppression at the neighbours
-  const cv::Rect around =
-      cv::Rect(cell.x - kReach, cell.y - kReach, cell.width + 2 * kReach, cell.height + 2 * kReach) &
-      cv::Rect({}, grey.size());
+  const cv::Rect around = cv::Rect(cell.x - kReach, cell.y - kReach, cell.width + 2 * kReach,
+                                   cell.height + 2 * kReach) &
+                          cv::Rect({}, grey.size());
   const cv::Point2f to_cell(around.tl() - cell.tl());
   const auto outside = [&](const cv::KeyPoint& corner) {
     return !cv::Rect({}, cell.size()).contains(cv::Point(corner.pt + to_cell));

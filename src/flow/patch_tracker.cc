@@ -80,7 +80,8 @@ inline constexpr bool kIntensityAlone =
 
 /// Channels of a level: intensity alone, or all of SampleChannels.
 template <class Residual>
-inline constexpr int kChannelsOf = kIntensityAlone<Residual> ? 1 : alignment::SampleChannels::kChannels;
+inline constexpr int kChannelsOf =
+    kIntensityAlone<Residual> ? 1 : alignment::SampleChannels::kChannels;
 
 /// A level of a pyramid, interleaved channels.
 struct LevelView {
@@ -123,8 +124,7 @@ struct PatchSlopes : PatchValues<N> {
   std::array<PixelRow, N> d_x, d_y;
 
   SGF_ALWAYS_INLINE alignment::ChannelsAt<float, 4> WithSlopes(int k) const {
-    alignment::ChannelsAt<float, 4> at{this->At(k), Eigen::Array4f::Zero(),
-                                       Eigen::Array4f::Zero()};
+    alignment::ChannelsAt<float, 4> at{this->At(k), Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
     for (int c = 0; c < N; ++c) {
       at.d_x[c] = d_x[size_t(c)][k];
       at.d_y[c] = d_y[size_t(c)][k];
@@ -161,6 +161,9 @@ struct LevelTemplate {
   bool usable;
   float divisor;  ///< of lssd
   PatchReference<kIntensityAlone<Residual>> reference;
+  /// How the channels change with the place, for residuals that are linearised at the current
+  /// image: at the minimum it shows the same, and five patches would have to be sampled there.
+  std::array<std::array<PixelRow, kInverse ? 0 : kChannelsOf<Residual>>, 2> slopes;
   /// H^-1 J^T, whose product with the residuals is the step.
   std::array<std::array<PixelRow, kInverse ? PatchWarp::kParameters : 0>, Residual::kDim> gain;
 };
@@ -221,8 +224,8 @@ HWY_INLINE V Interpolate(V a, V b, V c, V d, V fx, V fy) {
 
 using Four = hn::CappedTag<float, 4>;
 
-// Neighbours p[index] and p[index + 1] of a vector of pixels. Loads of both at once and shuffles take
-// a quarter of the time of gathers.
+// Neighbours p[index] and p[index + 1] of a vector of pixels. Loads of both at once and shuffles
+// take a quarter of the time of gathers.
 HWY_INLINE void LoadPairs(const float* p, const int32_t* index, hn::Vec<Four>& left,
                           hn::Vec<Four>& right) {
   const Four d;
@@ -250,9 +253,8 @@ HWY_INLINE void SampleGrey(const LevelView& image, ptrdiff_t shift, const Places
     hn::Vec<Four> a, b, c, e;
     LoadPairs(upper, index, a, b);
     LoadPairs(lower, index, c, e);
-    hn::StoreU(
-        Interpolate(a, b, c, e, hn::LoadU(d, &places.fx[k]), hn::LoadU(d, &places.fy[k])), d,
-        &out[0][k]);
+    hn::StoreU(Interpolate(a, b, c, e, hn::LoadU(d, &places.fx[k]), hn::LoadU(d, &places.fy[k])), d,
+               &out[0][k]);
   }
 }
 
@@ -271,20 +273,36 @@ HWY_INLINE void Transpose(const float* pixels, int k, std::array<PixelRow, 4>& c
 #endif
 }
 
-// Four channels: a pixel at a time, and four of them are turned.
+// Four channels: a pixel at a time, and four of them are turned. Rows first: both pixels of a row
+// lie side by side.
 HWY_INLINE void SampleFour(const LevelView& image, ptrdiff_t shift, const Places& places, int n,
                            std::array<PixelRow, 4>& out) {
-  const Four d;
+  const hn::CappedTag<float, 8> d;
+  const Four half;
+  constexpr int kPair = 8;
   for (int k = 0; k < n; k += 4) {
-    alignas(64) float value[16];
-    for (int i = 0; i < 16; i += int(hn::Lanes(d))) {
-      const int pixel = k + i / 4;
-      const float* upper = image.pixels + shift + places.index[size_t(pixel)] + i % 4;
-      const float* lower = upper + image.stride;
-      hn::Store(Interpolate(hn::LoadU(d, upper), hn::LoadU(d, upper + 4), hn::LoadU(d, lower),
-                            hn::LoadU(d, lower + 4), hn::Set(d, places.fx[pixel]),
-                            hn::Set(d, places.fy[pixel])),
-                d, value + i);
+    alignas(32) float value[16], pair[kPair];
+    for (int i = 0; i < 4; ++i) {
+      const float* upper = image.pixels + shift + places.index[size_t(k + i)];
+      const auto fy = hn::Set(d, places.fy[k + i]);
+      const auto between = [&](int at) HWY_ATTR {
+        const auto u = hn::LoadU(d, upper + at);
+        return hn::Add(u, hn::Mul(fy, hn::Sub(hn::LoadU(d, upper + image.stride + at), u)));
+      };
+#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
+      static_cast<void>(pair);
+      const auto both = between(0);
+      const auto left = hn::LowerHalf(half, both), right = hn::UpperHalf(half, both);
+      hn::StoreU(hn::Add(left, hn::Mul(hn::Set(half, places.fx[k + i]), hn::Sub(right, left))),
+                 half, value + 4 * i);
+#else
+      for (int at = 0; at < kPair; at += int(hn::Lanes(d))) hn::StoreU(between(at), d, pair + at);
+      for (int c = 0; c < 4; c += int(hn::Lanes(half))) {
+        const auto left = hn::LoadU(half, pair + c), right = hn::LoadU(half, pair + 4 + c);
+        hn::StoreU(hn::Add(left, hn::Mul(hn::Set(half, places.fx[k + i]), hn::Sub(right, left))),
+                   half, value + 4 * i + c);
+      }
+#endif
     }
     Transpose(value, k, out);
   }
@@ -356,18 +374,49 @@ SGF_FLATTEN inline void Evaluate(const Residual& residual, const Values& at, con
       for (int c = 0; c < Residual::kDim; ++c) r[size_t(c)][k] = value(c);
     }
   } else {
-    const float divisor = metrics::Lssd::Divisor(
-        Dot(at.value[0], pattern.mask, pattern.padded), size_t(pattern.size));
+    const float divisor = metrics::Lssd::Divisor(Dot(at.value[0], pattern.mask, pattern.padded),
+                                                 size_t(pattern.size));
     for (int k = 0; k < pattern.padded; ++k)
       r[0][k] = metrics::Lssd::Component(at.value[0][k], divisor, level.reference.member[0][k],
                                          level.divisor);
   }
 }
 
+// The samples of a reference.
+template <class Residual, class Slopes>
+SGF_FLATTEN inline void MakeReference(const Slopes& at, int n,
+                                      PatchReference<kIntensityAlone<Residual>>& reference) {
+#pragma GCC ivdep
+  for (int k = 0; k < n; ++k)
+    reference.Set(k, Residual::template MakeReference<float>(at.WithSlopes(k)));
+}
+
+// Slopes of a reference's gradients, H, as an image turned by A shows them: A H A^T.
+template <class Reference>
+SGF_FLATTEN inline void Turn(const Reference& slopes, const Matrix2f& linear, int n,
+                             PatchSlopes<4>& at) {
+  using alignment::kGradientX, alignment::kGradientY;
+  const float c = linear(0, 0), s = linear(1, 0);
+#pragma GCC ivdep
+  for (int k = 0; k < n; ++k) {
+    const float xx = slopes[0][kGradientX][k], xy = slopes[1][kGradientX][k];
+    const float yx = slopes[0][kGradientY][k], yy = slopes[1][kGradientY][k];
+    const float xx_a = c * xx - s * yx, xy_a = c * xy - s * yy;
+    const float yx_a = s * xx + c * yx, yy_a = s * xy + c * yy;
+    at.d_x[kGradientX][k] = xx_a * c - xy_a * s;
+    at.d_y[kGradientX][k] = xx_a * s + xy_a * c;
+    at.d_x[kGradientY][k] = yx_a * c - yy_a * s;
+    at.d_y[kGradientY][k] = yx_a * s + yy_a * c;
+    at.d_x[0][k] = at.value[kGradientX][k];
+    at.d_y[0][k] = at.value[kGradientY][k];
+    at.d_x[3][k] = at.d_y[3][k] = 0;  // epsilon counts as constant
+  }
+}
+
 // Residuals and their derivatives by the warp's parameters.
 template <class Residual, class Slopes>
 SGF_FLATTEN inline void Linearize(const Residual& residual, const Slopes& at, const PatchWarp& warp,
-                                  const LevelTemplate<Residual>& level,
+                                  const PatchReference<kIntensityAlone<Residual>>& reference,
                                   const PaddedPattern& pattern, Residuals<Residual>& r,
                                   Jacobians<Residual>& J) {
   const Matrix2f linear = warp.Linear();
@@ -376,7 +425,7 @@ SGF_FLATTEN inline void Linearize(const Residual& residual, const Slopes& at, co
     PatchWarp::Point point;
     warp.Place({pattern.x[k], pattern.y[k]}, linear, point);
     Eigen::Matrix<float, Residual::kDim, kParameters> J_k;
-    const auto value = residual.Linearize(at.WithSlopes(k), point, level.reference.At(k), J_k);
+    const auto value = residual.Linearize(at.WithSlopes(k), point, reference.At(k), J_k);
     for (int c = 0; c < Residual::kDim; ++c) {
       r[size_t(c)][k] = value(c) * pattern.mask[k];
       for (int p = 0; p < kParameters; ++p)
@@ -424,6 +473,13 @@ Eigen::Matrix3d HessianOf(const Jacobians<Residual>& J, int n) {
   return H;
 }
 
+// Whether all parameters can be told from one another.
+inline bool Observable(const Eigen::Matrix3d& H) {
+  // The determinant is 1 for independent parameters of unit curvature, 0 for dependent ones.
+  constexpr double kLeast = 1e-6;
+  return H.determinant() > kLeast * H.diagonal().prod();
+}
+
 template <class Residual>
 class TrackerOf final : public PatchTracker {
   static constexpr int N = kChannelsOf<Residual>;
@@ -446,10 +502,10 @@ class TrackerOf final : public PatchTracker {
     return std::make_unique<TemplateOf<Residual>>(options_.levels);
   }
 
-  bool MakeTemplate(const Pyramid& image, const Vector2f& centre,
+  bool MakeTemplate(const Pyramid& image, const Vector2f& centre, int used,
                     PatchTemplate& patch) const override {
     auto& levels = static_cast<TemplateOf<Residual>&>(patch).level;
-    for (int level = 0; level < options_.levels; ++level) {
+    for (int level = 0; level < used; ++level) {
       const LevelView view = ViewOf<Residual>(image, level);
       PatchWarp warp;
       warp.centre = ToLevel(centre, level);
@@ -503,10 +559,15 @@ class TrackerOf final : public PatchTracker {
   bool MakeLevel(const LevelView& view, const PatchWarp& warp, Level& level) const {
     PatchSlopes<N> at;
     SamplePatch(view, pattern_, warp, at);
-    for (int k = 0; k < pattern_.padded; ++k)
-      level.reference.Set(k, Residual::template MakeReference<float>(at.WithSlopes(k)));
+    MakeReference<Residual>(at, pattern_.padded, level.reference);
     if constexpr (!Residual::kInverseCompositional) {
-      return true;
+      level.slopes = {at.d_x, at.d_y};
+      // A cost has no slope here. The gradients' own shows whether there is anything to follow.
+      using Gradients = alignment::PointResidual<metrics::Gn>;
+      Residuals<Gradients> r;
+      Jacobians<Gradients> J;
+      Linearize(Gradients{}, at, warp, level.reference, pattern_, r, J);
+      return Observable(HessianOf<Gradients>(J, pattern_.padded));
     } else {
       Jacobians<Residual> J;
       LinearizeReference(at, warp, level, J);
@@ -518,7 +579,7 @@ class TrackerOf final : public PatchTracker {
                           Jacobians<Residual>& J) const {
     if constexpr (alignment::kPointwise<Residual>) {
       Residuals<Residual> r;
-      Linearize(residual_, at, warp, level, pattern_, r, J);
+      Linearize(residual_, at, warp, level.reference, pattern_, r, J);
     } else {
       const float sum = Dot(at.value[0], pattern_.mask, pattern_.padded);
       level.divisor = metrics::Lssd::Divisor(sum, size_t(pattern_.size));
@@ -528,15 +589,13 @@ class TrackerOf final : public PatchTracker {
 
   bool MakeGain(const Jacobians<Residual>& J, Level& level) const {
     const Eigen::Matrix3d H = HessianOf<Residual>(J, pattern_.padded);
-    // 1 for independent parameters, 0 where one cannot be told from the others.
-    constexpr double kLeastObservable = 1e-6;
-    if (!(H.determinant() > kLeastObservable * H.diagonal().prod())) return false;
+    if (!Observable(H)) return false;
     const Eigen::Matrix3f inverse = H.inverse().cast<float>();
     for (size_t c = 0; c < J.size(); ++c)
       for (int p = 0; p < kParameters; ++p)
         for (int k = 0; k < pattern_.padded; ++k)
-          level.gain[c][size_t(p)][k] = inverse(p, 0) * J[c][0][k] + inverse(p, 1) * J[c][1][k] +
-                                        inverse(p, 2) * J[c][2][k];
+          level.gain[c][size_t(p)][k] =
+              inverse(p, 0) * J[c][0][k] + inverse(p, 1) * J[c][1][k] + inverse(p, 2) * J[c][2][k];
     return inverse.allFinite();
   }
 
@@ -595,10 +654,11 @@ class TrackerOf final : public PatchTracker {
     if constexpr (!Residual::kInverseCompositional) {
       if (!view.Has(warp.centre, Margin(level))) return equations;
       PatchSlopes<N> at;
-      SamplePatch(view, pattern_, warp, at);
+      SamplePatch(view, pattern_, warp, static_cast<PatchValues<N>&>(at));
+      Turn(reference.slopes, warp.Linear(), pattern_.padded, at);
       Residuals<Residual> r;
       Jacobians<Residual> J;
-      Linearize(residual_, at, warp, reference, pattern_, r, J);
+      Linearize(residual_, at, warp, reference.reference, pattern_, r, J);
       const int n = pattern_.padded;
       Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
       sum.topLeftCorner<3, 3>() = HessianOf<Residual>(J, n);
@@ -613,7 +673,7 @@ class TrackerOf final : public PatchTracker {
   bool TrackForward(const Level& reference, const LevelView& view, int level,
                     PatchWarp& warp) const {
     alignment::NormalEquations<double, kParameters> last;
-    alignment::SolverOptions options{.max_iterations = options_.max_iterations};
+    alignment::SolverOptions options{.max_iterations = options_.max_iterations, .tolerance = 1e-6};
     alignment::Minimize<kParameters>(
         warp, [&](const PatchWarp& w) { return EquationsAt(reference, view, level, w); },
         [](PatchWarp w, const Eigen::Vector3d& delta) {
@@ -630,14 +690,14 @@ class TrackerOf final : public PatchTracker {
 };
 
 std::unique_ptr<const PatchTracker> MakeTracker(const TrackerOptions& options) {
-  return alignment::VisitResidual(
-      options.residual, [&](const auto& residual) -> std::unique_ptr<const PatchTracker> {
-        using Residual = std::remove_cvref_t<decltype(residual)>;
-        if constexpr (kTrackable<Residual>)
-          return std::make_unique<TrackerOf<Residual>>(options);
-        else
-          return nullptr;
-      });
+  return alignment::VisitResidual(options.residual,
+                                  [&](const auto& residual) -> std::unique_ptr<const PatchTracker> {
+                                    using Residual = std::remove_cvref_t<decltype(residual)>;
+                                    if constexpr (kTrackable<Residual>)
+                                      return std::make_unique<TrackerOf<Residual>>(options);
+                                    else
+                                      return nullptr;
+                                  });
 }
 
 }  // namespace HWY_NAMESPACE

@@ -26,7 +26,8 @@ struct TrackerOptions {
   double tolerance_px = 0.01;
 };
 
-/// An image as a tracker samples it: grey levels alone, or with their gradients. Finest level first.
+/// An image as a tracker samples it: grey levels alone, or with their gradients. Finest level
+/// first.
 struct Pyramid {
   std::vector<cv::Mat1f> grey;
   std::vector<alignment::SampleChannels> samples;  ///< empty for residuals of intensities alone
@@ -56,9 +57,10 @@ class PatchTracker {
   /// Takes a patch from an image. At coarse levels it may reach over the border, where pixels count
   /// as flat.
   /// @param centre px.
+  /// @param levels that will be used, the finest ones.
   /// @return whether it lies whole in the finest level and can be followed there: not where it is
   ///   flat or has but one edge.
-  virtual bool MakeTemplate(const Pyramid& image, const Eigen::Vector2f& centre,
+  virtual bool MakeTemplate(const Pyramid& image, const Eigen::Vector2f& centre, int levels,
                             PatchTemplate& patch) const = 0;
 
   /// Where a patch, as it is, fits best at the coarsest level.

@@ -172,25 +172,24 @@ class StereoFlow::Impl {
     PatchWarp warp;
     warp.centre = track.left;
     if (R_cur_last && !Rotate(rig_.left, *R_cur_last, track.left, warp)) return false;
-    return ThereAndBack(track.left, last_left_, left_, options_.levels, warp, *track.patch,
-                        *track.patch) &&
-           std::exchange(track.left, warp.centre).allFinite();
+    const PatchWarp guess = warp;
+    const Vector2f from = track.left;
+    if (!tracker_->Track(*track.patch, left_, options_.levels, warp)) return false;
+    track.left = warp.centre;
+    return ComesBack(from, last_left_, left_, options_.levels, guess, warp.centre, *track.patch);
   }
 
-  /// Follows a patch to another image, takes it anew from there, and follows that back.
-  /// @param[in,out] warp first guess and result.
-  /// @param[out] there patch of the other image; may be `patch` itself.
-  bool ThereAndBack(const Vector2f& from, const Pyramid& image, const Pyramid& other, int levels,
-                    PatchWarp& warp, const PatchTemplate& patch, PatchTemplate& there) const {
-    // The way back starts as far off as the way there did, so that it proves something.
-    const PatchWarp guess = warp;
-    if (!tracker_->Track(patch, other, levels, warp) ||
-        !tracker_->MakeTemplate(other, warp.centre, there))
-      return false;
+  /// Whether the patch that another image shows is found in the first image where it came from.
+  /// @param guess where the way there began; the way back begins as far off, so that it proves
+  ///   something.
+  /// @param[out] there the patch of the other image, at `to`.
+  bool ComesBack(const Vector2f& from, const Pyramid& image, const Pyramid& other, int levels,
+                 const PatchWarp& guess, const Vector2f& to, PatchTemplate& there) const {
     PatchWarp back;
-    back.centre = warp.centre - (guess.centre - from);
+    back.centre = to - (guess.centre - from);
     back.angle = -guess.angle;
-    return tracker_->Track(there, image, levels, back) &&
+    return tracker_->MakeTemplate(other, to, levels, there) &&
+           tracker_->Track(there, image, levels, back) &&
            (back.centre - from).norm() <= options_.max_backward_px;
   }
 
@@ -231,7 +230,7 @@ class StereoFlow::Impl {
       if (!corner) return;
       track.left = *corner;
       track.patch = tracker_->NewTemplate();
-      track.found = tracker_->MakeTemplate(left_, track.left, *track.patch);
+      track.found = tracker_->MakeTemplate(left_, track.left, options_.levels, *track.patch);
     });
     for (Track& track : found) {
       if (!track.found) continue;
@@ -276,11 +275,14 @@ class StereoFlow::Impl {
 
   std::optional<Vector2f> MatchFrom(const Track& track, const Vector2f& disparity,
                                     int levels) const {
-    PatchWarp warp;
-    warp.centre = track.left + disparity;
-    const auto there = tracker_->NewTemplate();
-    if (!ThereAndBack(track.left, left_, right_, levels, warp, *track.patch, *there) ||
+    PatchWarp guess;
+    guess.centre = track.left + disparity;
+    PatchWarp warp = guess;
+    if (!tracker_->Track(*track.patch, right_, levels, warp) ||
         !on_epipolar_line_(track.left, warp.centre))
+      return std::nullopt;
+    const auto there = tracker_->NewTemplate();
+    if (!ComesBack(track.left, left_, right_, levels, guess, warp.centre, *there))
       return std::nullopt;
     return warp.centre;
   }

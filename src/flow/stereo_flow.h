@@ -31,7 +31,7 @@ struct FlowOptions {
   int stereo_levels = 2;
   int max_iterations = 5;
   double tolerance_px = 0.01;
-  int cell_px = 50;
+  int cell_px = 56;
   int border_px = 10;
   int fast_threshold = 40;
   int least_fast_threshold = 5;
@@ -51,7 +51,9 @@ struct FlowOptions {
     visit("max_iterations", max_iterations, "", "at a level");
     visit("tolerance_px", tolerance_px, "px",
           "step that ends the iterations at the finest level; ten times that at the coarser ones");
-    visit("cell_px", cell_px, "px", "side of the grid's cells; an empty one gets a new track");
+    visit("cell_px", cell_px, "px",
+          "side of the grid's cells; an empty one gets a new track (56: about 210 of EuRoC's "
+          "images)");
     visit("border_px", border_px, "px", "around the grid, where no track begins");
     visit("fast_threshold", fast_threshold, "grey levels", "of the corners looked for first");
     visit("least_fast_threshold", least_fast_threshold, "grey levels",
@@ -92,10 +94,10 @@ struct FlowTimes {
 struct FlowFrame {
   std::int64_t time_ns = 0;
   std::vector<FlowObservation> observations;  ///< sorted by id
-  int tracked = 0;   ///< tracks of the last frame that were found
-  int lost = 0;      ///< and that were not: they have ended
-  int detected = 0;  ///< tracks that begin
-  int stereo = 0;    ///< observations with a right point
+  int tracked = 0;                            ///< tracks of the last frame that were found
+  int lost = 0;                               ///< and that were not: they have ended
+  int detected = 0;                           ///< tracks that begin
+  int stereo = 0;                             ///< observations with a right point
   FlowTimes times;
 };
 
@@ -115,7 +117,8 @@ class StereoFlow {
   /// @param left, right 8-bit grey images of the cameras' sizes. The right one may be empty.
   /// @param R_cur_last rotation of the left camera: coordinates at the last frame to those at this
   ///   one, where known. Tracks are then searched where it takes them.
-  /// @throws Error for other images, or a time that does not increase; the tracks stay as they were.
+  /// @throws Error for other images, or a time that does not increase; the tracks stay as they
+  /// were.
   FlowFrame Process(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right,
                     const std::optional<Eigen::Quaterniond>& R_cur_last = std::nullopt);
 

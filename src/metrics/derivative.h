@@ -35,7 +35,8 @@ inline SampleDerivative<T, 1> IntensityDerivative(T d_intensity) {
 template <class T, int Dim>
 inline SampleDerivative<T, Dim> GradientDerivative(const Eigen::Matrix<T, Dim, 2>& d_gradient) {
   SampleDerivative<T, Dim> derivative;
-  derivative.gradient = d_gradient;
+  for (int k = 0; k < Dim; ++k)  // number by number, see NormalizedGradientJacobian()
+    for (int c = 0; c < 2; ++c) derivative.gradient(k, c) = d_gradient(k, c);
   return derivative;
 }
 

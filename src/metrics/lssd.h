@@ -53,8 +53,8 @@ struct Lssd {
     return i / divisor_i - j / divisor_j;
   }
 
-  /// Derivative of Component() where intensity i changes by d_i and the mean of its patch by d_mean;
-  /// d_mean is 0 where the patch stays undivided.
+  /// Derivative of Component() where intensity i changes by d_i and the mean of its patch by
+  /// d_mean; d_mean is 0 where the patch stays undivided.
   template <class T>
   static T Derivative(const T& i, const T& divisor_i, const T& d_i, const T& d_mean) {
     return d_i / divisor_i - i / (divisor_i * divisor_i) * d_mean;
