@@ -14,8 +14,8 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 
 TEST(SequenceChange, DefaultsChangeNothing) {
   EXPECT_TRUE(ChangesNothing({}));
-  EXPECT_FALSE(ChangesNothing({.light = -0.5}));
-  EXPECT_FALSE(ChangesNothing({.exposure_high = 2}));
+  EXPECT_FALSE(ChangesNothing(SequenceChange{.light = -0.5}));
+  EXPECT_FALSE(ChangesNothing(SequenceChange{.exposure_high = 2}));
 }
 
 TEST(SequenceChange, ExposureIsConstantWithinAPeriod) {
@@ -43,10 +43,10 @@ TEST(SequenceChange, SeedsDiffer) {
 }
 
 TEST(SequenceChange, RefusesWhatIsOutOfRange) {
-  EXPECT_NE(ErrorMessage([] { CheckChange({.light_period_s = 0}); }).find("light_period_s"),
+  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.light_period_s = 0}); }).find("light_period_s"),
             std::string::npos);
-  EXPECT_NE(ErrorMessage([] { CheckChange({.light = -1}); }).find("light"), std::string::npos);
-  EXPECT_NE(ErrorMessage([] { CheckChange({.exposure_low = 2}); }).find("exposure_low"),
+  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.light = -1}); }).find("light"), std::string::npos);
+  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.exposure_low = 2}); }).find("exposure_low"),
             std::string::npos);
 }
 

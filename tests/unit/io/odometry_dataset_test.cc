@@ -97,7 +97,7 @@ TEST_F(EurocOdometry, MayHaveOneCamera) {
   fs::remove_all(folder_ / "mav0/cam1");
   const OdometrySequence sequence = OpenOdometrySequence(folder_);
   EXPECT_EQ(sequence.cameras.size(), 1U);
-  EXPECT_EQ(sequence.frames.size(), 4U);
+  EXPECT_EQ(sequence.frames.size(), 3U);
   EXPECT_TRUE(sequence.frames[0].right.empty());
 }
 
