@@ -39,8 +39,8 @@ VisualEquations::VisualEquations(const VioRig& rig, const WindowOptions& options
 }
 
 /// All in units of the landmark's depth, so that it may be at infinity: with d = (x, y, 1) and the
-/// inverse depth rho, b = R_bc d + rho t_bc in the host's body, q = R_h b + rho (p_h - p_t) from the
-/// target's body in world axes, P = R_cb R_t^T q + rho t_cb in the target's camera.
+/// inverse depth rho, b = R_bc d + rho t_bc in the host's body, q = R_h b + rho (p_h - p_t) from
+/// the target's body in world axes, P = R_cb R_t^T q + rho t_cb in the target's camera.
 bool VisualEquations::See(std::span<const PoseState> poses, const LandmarkItem& item, size_t sight,
                           bool derivatives, Seen& seen) const {
   const LandmarkSight& at = item.landmark->sights[sight];
@@ -60,7 +60,12 @@ bool VisualEquations::See(std::span<const PoseState> poses, const LandmarkItem& 
   if (!derivatives) return true;
   const SE3 &T_h = host.linearization, &T_t = target.linearization;
   const Vector3d L = project(T_h, T_t);
-  if (!(L.z() > kLeastDepth)) return false;
+  if (!(L.z() > kLeastDepth)) {  // an error, but no slope
+    seen.by_host.setZero();
+    seen.by_target.setZero();
+    seen.by_landmark.setZero();
+    return true;
+  }
   const double s = weight_ / L.z();
   Eigen::Matrix<double, 2, 3> by_P;
   by_P << s, 0, -s * L.x() / L.z(), 0, s, -s * L.y() / L.z();
