@@ -125,14 +125,15 @@ class StereoFlow::Impl {
         on_epipolar_line_(rig, options.max_epipolar_error) {}
 
   FlowFrame Process(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right,
-                    const std::optional<Eigen::Quaterniond>& R_cur_last) {
+                    const std::optional<Eigen::Quaterniond>& R_cur_last,
+                    const ExpectedPixels& expected) {
     CheckInput(time_ns, left, right);
     Stopwatch whole, watch;
     FlowFrame frame;
     frame.time_ns = time_ns;
     MakePyramids(left, right);
     frame.times.pyramid_s = watch.Lap();
-    TrackAll(R_cur_last, frame);
+    TrackAll(R_cur_last, expected, frame);
     frame.times.tracking_s = watch.Lap();
     Detect(left, frame);
     frame.times.detection_s = watch.Lap();
@@ -159,24 +160,33 @@ class StereoFlow::Impl {
     });
   }
 
-  void TrackAll(const std::optional<Eigen::Quaterniond>& R_cur_last, FlowFrame& frame) {
+  void TrackAll(const std::optional<Eigen::Quaterniond>& R_cur_last,
+                const ExpectedPixels& expected, FlowFrame& frame) {
     ParallelForBatches(int(tracks_.size()), options_.threads, [&](int k) {
       Track& track = tracks_[size_t(k)];
-      track.found = TrackOne(R_cur_last, track);
+      const auto place = expected.find(track.id);
+      track.found = (place != expected.end() && TrackFrom(R_cur_last, place->second, track)) ||
+                    TrackFrom(R_cur_last, std::nullopt, track);
     });
     frame.lost = int(std::erase_if(tracks_, [](const Track& track) { return !track.found; }));
     frame.tracked = int(tracks_.size());
   }
 
-  bool TrackOne(const std::optional<Eigen::Quaterniond>& R_cur_last, Track& track) const {
+  /// @param place where the track is expected, if not where the rotation takes it.
+  bool TrackFrom(const std::optional<Eigen::Quaterniond>& R_cur_last,
+                 const std::optional<Eigen::Vector2d>& place, Track& track) const {
     PatchWarp warp;
     warp.centre = track.left;
     if (R_cur_last && !Rotate(rig_.left, *R_cur_last, track.left, warp)) return false;
+    if (place) warp.centre = place->cast<float>();
     const PatchWarp guess = warp;
-    const Vector2f from = track.left;
     if (!tracker_->Track(*track.patch, left_, options_.levels, warp)) return false;
+    auto there = tracker_->NewTemplate();  // the old one is needed for another try
+    if (!ComesBack(track.left, last_left_, left_, options_.levels, guess, warp.centre, *there))
+      return false;
     track.left = warp.centre;
-    return ComesBack(from, last_left_, left_, options_.levels, guess, warp.centre, *track.patch);
+    track.patch = std::move(there);
+    return true;
   }
 
   /// Whether the patch that another image shows is found in the first image where it came from.
@@ -317,8 +327,9 @@ StereoFlow::StereoFlow(StereoFlow&&) noexcept = default;
 StereoFlow& StereoFlow::operator=(StereoFlow&&) noexcept = default;
 
 FlowFrame StereoFlow::Process(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right,
-                              const std::optional<Eigen::Quaterniond>& R_cur_last) {
-  return impl_->Process(time_ns, left, right, R_cur_last);
+                              const std::optional<Eigen::Quaterniond>& R_cur_last,
+                              const ExpectedPixels& expected) {
+  return impl_->Process(time_ns, left, right, R_cur_last, expected);
 }
 
 }  // namespace sgf::flow

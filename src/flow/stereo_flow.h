@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,7 +36,7 @@ struct FlowOptions {
   int border_px = 10;
   int fast_threshold = 40;
   int least_fast_threshold = 5;
-  double max_backward_px = 0.2;
+  double max_backward_px = 0.5;
   double max_epipolar_error = 0.005;
   double max_disparity_px = 100;
   int threads = 1;
@@ -90,6 +91,9 @@ struct FlowTimes {
   double pyramid_s = 0, tracking_s = 0, stereo_s = 0, detection_s = 0, total_s = 0;
 };
 
+/// Where the left image is thought to show tracks, px, by their ids: of those whose depth is known.
+using ExpectedPixels = std::map<std::int64_t, Eigen::Vector2d>;
+
 /// What a frame shows.
 struct FlowFrame {
   std::int64_t time_ns = 0;
@@ -117,10 +121,12 @@ class StereoFlow {
   /// @param left, right 8-bit grey images of the cameras' sizes. The right one may be empty.
   /// @param R_cur_last rotation of the left camera: coordinates at the last frame to those at this
   ///   one, where known. Tracks are then searched where it takes them.
+  /// @param expected where tracks are searched first.
   /// @throws Error for other images, or a time that does not increase; the tracks stay as they
   /// were.
   FlowFrame Process(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right,
-                    const std::optional<Eigen::Quaterniond>& R_cur_last = std::nullopt);
+                    const std::optional<Eigen::Quaterniond>& R_cur_last = std::nullopt,
+                    const ExpectedPixels& expected = {});
 
  private:
   class Impl;

@@ -60,7 +60,7 @@ class StereoInertialOdometry::Impl {
     Stopwatch total, stage;
     VioFrameResult result{.time_ns = time_ns, .segment = segment_};
     Frame frame = Predict(time_ns);
-    const flow::FlowFrame seen = flow_.Process(time_ns, left, right, RotationSinceLast(frame));
+    const flow::FlowFrame seen = flow_.Process(time_ns, left, right, RotationSinceLast(frame), Expected(frame));
     result.flow = seen.times;
     result.times.flow_s = stage.Lap();
     result.tracks = static_cast<int>(seen.observations.size());
@@ -143,6 +143,23 @@ class StereoInertialOdometry::Impl {
     const Eigen::Quaterniond R_body_left = window_.rig().T_body_cam[0].R;
     return R_body_left.conjugate() * frame.state.T_world_body.R.conjugate() *
            last->state.T_world_body.R * R_body_left;
+  }
+
+  /// Where the new frame is thought to see the landmarks that the last one saw.
+  flow::ExpectedPixels Expected(const Frame& frame) const {
+    flow::ExpectedPixels expected;
+    if (window_.frames.size() < 2) return expected;
+    const SE3 T_cam_world = window_.PoseOf(frame, 0).Inverse();
+    for (const auto& [id, track] : tracks_) {
+      const auto landmark = window_.landmarks.find(id);
+      if (landmark == window_.landmarks.end()) continue;
+      const Vector3d point = T_cam_world * PositionOf(landmark->second);
+      const Vector2d pixel = point.z() > 0 ? cameras_.left.Project(point) : Vector2d(-1, -1);
+      if (pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < cameras_.left.width &&
+          pixel.y() < cameras_.left.height)
+        expected[id] = pixel;
+    }
+    return expected;
   }
 
   // --- Begin ---
@@ -407,10 +424,14 @@ class StereoInertialOdometry::Impl {
     return least;
   }
 
+  /// In the window's world.
+  Vector3d PositionOf(const Landmark& landmark) const {
+    return window_.PoseOf(*window_.Find(landmark.host), 0) *
+           (landmark.ray.homogeneous() / landmark.inverse_depth);
+  }
+
   VioPoint ToPoint(const Landmark& landmark) const {
-    const SE3 T_world_cam = window_.PoseOf(*window_.Find(landmark.host), 0);
-    return {.position = R_gravity_world_.conjugate() *
-                        (T_world_cam * (landmark.ray.homogeneous() / landmark.inverse_depth)),
+    return {.position = R_gravity_world_.conjugate() * PositionOf(landmark),
             .inverse_depth = landmark.inverse_depth,
             .inverse_depth_variance = landmark.inverse_depth_variance,
             .support = static_cast<int>(landmark.sights.size()),

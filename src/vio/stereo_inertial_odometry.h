@@ -31,7 +31,7 @@ struct VioOptions {
   int states = 3;
   int keyframes = 7;
   double keyframe_share = 0.7;
-  int keyframe_gap = 5;
+  int keyframe_gap = 3;
   double least_parallax = 0.01;
   int least_sights = 12;
   double blind_s = 2;
