@@ -68,7 +68,12 @@ class StereoInertialOdometry::Impl {
     result.times.flow_s = stage.Lap();
     result.tracks = static_cast<int>(seen.observations.size());
     result.stereo_tracks = seen.stereo;
-    if (window_.frames.empty()) Begin(frame);
+    if (window_.frames.empty()) {
+      if (options_.inertial && imu_.samples().empty()) return result;  // waits
+      Begin(frame);
+    } else if (frame.since_last && !frame.inertial) {
+      ResumeInertial(frame);
+    }
     window_.frames.push_back(std::move(frame));
     Observe(seen);
     const bool blind = window_.frames.size() > 1 && CountSeen() < options_.least_sights;
@@ -78,6 +83,8 @@ class StereoInertialOdometry::Impl {
     result.times.refinement_s = stage.Lap();
     if (result.state == VioState::kLost)
       Lose();
+    else if (SeesNothingYet(result))
+      Forget();
     else
       Marginalize();
     imu_.DropBefore(time_ns);
@@ -176,8 +183,29 @@ class StereoInertialOdometry::Impl {
     constexpr double kLeastSamples = 10;
     const bool rest = n >= kLeastSamples && std::sqrt(accel_spread) < options_.rest_accel_sigma &&
                       std::sqrt(gyro_spread) < options_.rest_gyro;
-    state.gyro_bias = rest ? gyro : Vector3d::Zero();
+    if (rest) {
+      state.gyro_bias = gyro;
+      state.velocity.setZero();
+    }
     return rest;
+  }
+
+  /// After a gap of the inertial sensor: the last frame has a velocity again, from where it was
+  /// before, and biases are what they were, with what is expected of them.
+  void ResumeInertial(Frame& frame) {
+    Frame& last = window_.frames.back();
+    constexpr double kVelocitySigma = 1;  // m/s
+    if (const size_t count = window_.frames.size(); count >= 2) {
+      const BodyState& before = window_.frames[count - 2].state;
+      const double dt_s = 1e-9 * static_cast<double>(last.state.time_ns - before.time_ns);
+      last.state.velocity = (last.state.T_world_body.p - before.T_world_body.p) / dt_s;
+    }
+    Eigen::Matrix<double, kMotionParameters, 1> sigmas;
+    sigmas << Vector3d::Constant(kVelocitySigma), Vector3d::Constant(options_.gyro_bias_sigma),
+        Vector3d::Constant(options_.accel_bias_sigma);
+    window_.AnchorMotion(last, sigmas);
+    frame.inertial = true;
+    frame.state = frame.since_last->Predict(last.state, options_.window.gravity);
   }
 
   // --- Every frame ---
@@ -256,8 +284,7 @@ class StereoInertialOdometry::Impl {
           window_.PoseOf(*window_.Find(other->frame), other->camera).Inverse() * T_world_host;
       const double least = other->frame == host.id ? 1e-3 : options_.least_parallax;
       if (const auto rho = TriangulateInverseDepth(own->ray, other->ray, T_other_host, least)) {
-        return Landmark{
-            .host = host.id, .ray = own->ray, .inverse_depth = *rho, .sights = track};
+        return Landmark{.host = host.id, .ray = own->ray, .inverse_depth = *rho, .sights = track};
       }
     }
     return std::nullopt;
@@ -274,11 +301,11 @@ class StereoInertialOdometry::Impl {
     if (!first && !result.window.usable) {
       result.state = VioState::kLost;
     } else if (blind) {
-      result.state = newest.inertial && blind_s <= options_.blind_s ? VioState::kPredicted
-                                                                    : VioState::kLost;
+      result.state =
+          newest.inertial && blind_s <= options_.blind_s ? VioState::kPredicted : VioState::kLost;
     } else {
-      result.state = first && window_.landmarks.empty() ? VioState::kInitialising
-                                                        : VioState::kTracked;
+      result.state =
+          first && window_.landmarks.empty() ? VioState::kInitialising : VioState::kTracked;
       last_sight_ns_ = newest.state.time_ns;
     }
     if (result.state == VioState::kLost) return;
@@ -287,12 +314,22 @@ class StereoInertialOdometry::Impl {
     if (options_.covariance) result.covariance = window_.CovarianceOf(newest);
   }
 
+  /// Neither a landmark nor enough tracks to make some of: no map to predict from.
+  bool SeesNothingYet(const VioFrameResult& result) const {
+    return result.state == VioState::kInitialising &&
+           static_cast<int>(tracks_.size()) < options_.least_sights;
+  }
+
   /// A new map begins at the last believed state.
   void Lose() {
     for (const auto& [id, landmark] : window_.landmarks) finished_.push_back(ToPoint(landmark));
+    Forget();
+    ++segment_;
+  }
+
+  void Forget() {
     window_ = Window(window_.rig(), options_.window, options_.threads);
     tracks_.clear();
-    ++segment_;
     since_keyframe_ = 0;
   }
 
@@ -393,9 +430,7 @@ const ImuHealth& StereoInertialOdometry::imu_health() const { return impl_->imu_
 std::vector<VioPoint> StereoInertialOdometry::TakeFinishedPoints() {
   return impl_->TakeFinishedPoints();
 }
-std::vector<VioPoint> StereoInertialOdometry::ActivePoints() const {
-  return impl_->ActivePoints();
-}
+std::vector<VioPoint> StereoInertialOdometry::ActivePoints() const { return impl_->ActivePoints(); }
 
 std::span<const std::pair<const char*, VioState>> EnumNames(VioState) {
   static constexpr std::pair<const char*, VioState> kNames[] = {

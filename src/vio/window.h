@@ -15,8 +15,9 @@
 #include <sgf/vio/prior.h>
 
 /// A window of frames and the landmarks that they see, refined together (Usenko, Demmel, Schubert,
-/// Stückler, Cremers, "Visual-inertial mapping with non-linear factor recovery", RA-L 2020; Leutenegger
-/// et al., "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015).
+/// Stückler, Cremers, "Visual-inertial mapping with non-linear factor recovery", RA-L 2020;
+/// Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR
+/// 2015).
 namespace sgf::vio {
 
 /// A frame of the window.
@@ -108,6 +109,9 @@ class Window {
   /// standard deviations in the order of Plus(), but rotations about the axes of the world: what
   /// gravity tells has to be apart from what it does not.
   void Anchor(Frame& frame, const Eigen::Matrix<double, 15, 1>& sigmas);
+
+  /// Makes a frame inertial and holds its motion, as it is now, with these standard deviations.
+  void AnchorMotion(Frame& frame, const Eigen::Matrix<double, kMotionParameters, 1>& sigmas);
 
   /// Refines all frames and landmarks.
   WindowSummary Refine();
