@@ -65,8 +65,10 @@ class StereoInertialOdometry::Impl {
     result.times.flow_s = stage.Lap();
     result.tracks = static_cast<int>(seen.observations.size());
     result.stereo_tracks = seen.stereo;
-    if (window_.frames.empty()) Begin(frame);
-    if (inertial_ && !frame.inertial) inertial_ = false;  // measurements are missing
+    if (window_.frames.empty())
+      Begin(frame);
+    else if (inertial_ && frame.since_last && !frame.inertial)
+      ResumeInertial(frame);
     window_.frames.push_back(std::move(frame));
     Observe(seen);
     const bool blind = window_.frames.size() > 1 && CountSeen() < options_.least_sights;
@@ -77,6 +79,8 @@ class StereoInertialOdometry::Impl {
     result.times.refinement_s = stage.Lap();
     if (result.state == VioState::kLost) {
       Lose();
+    } else if (SeesNothingYet(result)) {
+      Forget();
     } else {
       if (options_.inertial && !inertial_) Start(result);
       Marginalize();
@@ -231,6 +235,25 @@ class StereoInertialOdometry::Impl {
     last_ = window_.frames.back().state;
   }
 
+  /// After a gap of the inertial sensor: the last frame has a velocity again, from where it was
+  /// before, and biases are what they were, with what is expected of them.
+  void ResumeInertial(Frame& frame) {
+    Frame& last = window_.frames.back();
+    constexpr double kVelocitySigma = 1;  // m/s
+    if (const size_t count = window_.frames.size(); count >= 2) {
+      const BodyState& before = window_.frames[count - 2].state;
+      const double dt_s = 1e-9 * static_cast<double>(last.state.time_ns - before.time_ns);
+      last.state.velocity = (last.state.T_world_body.p - before.T_world_body.p) / dt_s;
+    }
+    Eigen::Matrix<double, kMotionParameters, 1> sigmas;
+    constexpr double kGyroBiasSigma = 0.01;  // rad/s
+    sigmas << Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
+        Vector3d::Constant(options_.start.accel_bias_sd);
+    window_.AnchorMotion(last, sigmas);
+    frame.inertial = true;
+    frame.state = frame.since_last->Predict(last.state, options_.window.gravity);
+  }
+
   // --- Every frame ---
 
   std::optional<Vector2d> RayOf(const Camera& camera, const Vector2d& pixel) const {
@@ -307,8 +330,7 @@ class StereoInertialOdometry::Impl {
           window_.PoseOf(*window_.Find(other->frame), other->camera).Inverse() * T_world_host;
       const double least = other->frame == host.id ? 1e-3 : options_.least_parallax;
       if (const auto rho = TriangulateInverseDepth(own->ray, other->ray, T_other_host, least)) {
-        return Landmark{
-            .host = host.id, .ray = own->ray, .inverse_depth = *rho, .sights = track};
+        return Landmark{.host = host.id, .ray = own->ray, .inverse_depth = *rho, .sights = track};
       }
     }
     return std::nullopt;
@@ -325,11 +347,11 @@ class StereoInertialOdometry::Impl {
     if (!first && !result.window.usable) {
       result.state = VioState::kLost;
     } else if (blind) {
-      result.state = newest.inertial && blind_s <= options_.blind_s ? VioState::kPredicted
-                                                                    : VioState::kLost;
+      result.state =
+          newest.inertial && blind_s <= options_.blind_s ? VioState::kPredicted : VioState::kLost;
     } else {
-      result.state = first && window_.landmarks.empty() ? VioState::kInitialising
-                                                        : VioState::kTracked;
+      result.state =
+          first && window_.landmarks.empty() ? VioState::kInitialising : VioState::kTracked;
       last_sight_ns_ = newest.state.time_ns;
     }
     result.body = last_;
@@ -352,14 +374,24 @@ class StereoInertialOdometry::Impl {
     result.covariance = turn * result.covariance * turn.transpose();
   }
 
+  /// Neither a landmark nor enough tracks to make some of: no map to predict from.
+  bool SeesNothingYet(const VioFrameResult& result) const {
+    return result.state == VioState::kInitialising &&
+           static_cast<int>(tracks_.size()) < options_.least_sights;
+  }
+
   /// A new map begins at the last believed state.
   void Lose() {
     for (const auto& [id, landmark] : window_.landmarks) finished_.push_back(ToPoint(landmark));
+    Forget();
+    ++segment_;
+  }
+
+  void Forget() {
     window_ = Window(window_.rig(), options_.window, options_.threads);
     tracks_.clear();
-    inertial_ = false;
     start_.clear();
-    ++segment_;
+    inertial_ = false;
     since_keyframe_ = 0;
   }
 
@@ -473,9 +505,7 @@ const ImuHealth& StereoInertialOdometry::imu_health() const { return impl_->imu_
 std::vector<VioPoint> StereoInertialOdometry::TakeFinishedPoints() {
   return impl_->TakeFinishedPoints();
 }
-std::vector<VioPoint> StereoInertialOdometry::ActivePoints() const {
-  return impl_->ActivePoints();
-}
+std::vector<VioPoint> StereoInertialOdometry::ActivePoints() const { return impl_->ActivePoints(); }
 
 std::span<const std::pair<const char*, VioState>> EnumNames(VioState) {
   static constexpr std::pair<const char*, VioState> kNames[] = {

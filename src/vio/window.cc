@@ -208,8 +208,8 @@ class InertialCost : public ceres::SizedCostFunction<15, kPoseParameters, kMotio
     r = weight_ * imu.Residual(from, to, gravity_, nullptr, nullptr);
     if (!jacobians) return r.allFinite();
     Matrix15 J_from, J_to;
-    imu.Residual(from_.in_prior ? from_.linearization : from,
-                 to_.in_prior ? to_.linearization : to, gravity_, &J_from, &J_to);
+    imu.Residual(from_.in_prior ? from_.linearization : from, to_.in_prior ? to_.linearization : to,
+                 gravity_, &J_from, &J_to);
     J_from.leftCols<3>() *=
         Linearization::TurnOf(from_, Eigen::Map<const Eigen::Vector3d>(parameters[0]));
     J_to.leftCols<3>() *=
@@ -251,8 +251,7 @@ class PriorCost : public ceres::CostFunction {
       const auto S = prior_.S().middleCols(column, size);
       r += S * Eigen::Map<const VectorXd>(parameters[k], size);
       using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-      if (jacobians && jacobians[k])
-        Eigen::Map<RowMajor>(jacobians[k], num_residuals(), size) = S;
+      if (jacobians && jacobians[k]) Eigen::Map<RowMajor>(jacobians[k], num_residuals(), size) = S;
       column += size;
     }
     return true;
@@ -336,12 +335,14 @@ void Window::AnchorPose(Frame& frame, const Eigen::Matrix<double, kPoseParameter
   prior_.Add(std::span(&block, 1), S, VectorXd::Zero(kPoseParameters));
 }
 
-void Window::AnchorMotion(Frame& frame,
-                          const Eigen::Matrix<double, kMotionParameters, 1>& sigmas) {
-  frame.linearization = frame.state;
-  frame.in_prior = true;
-  const BlockId block{frame.id, true};
-  prior_.Add(std::span(&block, 1), MatrixXd(sigmas.cwiseInverse().asDiagonal()),
+void Window::AnchorMotion(Frame& frame, const Eigen::Matrix<double, kMotionParameters, 1>& sigmas) {
+  if (!frame.in_prior) frame.linearization = frame.state;
+  frame.linearization.velocity = frame.state.velocity;
+  frame.linearization.gyro_bias = frame.state.gyro_bias;
+  frame.linearization.accel_bias = frame.state.accel_bias;
+  frame.inertial = frame.in_prior = true;
+  const BlockId motion{frame.id, true};
+  prior_.Add(std::span(&motion, 1), MatrixXd(sigmas.cwiseInverse().asDiagonal()),
              VectorXd::Zero(kMotionParameters));
 }
 
@@ -386,6 +387,9 @@ WindowSummary Window::Refine() {
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
   options.max_num_iterations = options_.max_iterations;
   options.function_tolerance = options_.tolerance;
+  // Nearly Gauss-Newton. Tilt, velocity and biases are known by 1e-4 of what single numbers are
+  // when the rest is held: with Ceres' 1e4 they would lag behind by many frames.
+  options.initial_trust_region_radius = 1e8;
   options.num_threads = 1;  // the order of sums must not depend on them
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary report;
@@ -479,8 +483,7 @@ void Window::Marginalize(std::span<const int> leaving, std::span<const int> moti
   std::erase_if(frames, [&](const Frame& frame) { return leaves(frame.id); });
   for (auto it = landmarks.begin(); it != landmarks.end();) {
     Landmark& landmark = it->second;
-    std::erase_if(landmark.sights,
-                  [&](const LandmarkSight& sight) { return leaves(sight.frame); });
+    std::erase_if(landmark.sights, [&](const LandmarkSight& sight) { return leaves(sight.frame); });
     it = leaves(landmark.host) || landmark.sights.empty() ? landmarks.erase(it) : std::next(it);
   }
 }

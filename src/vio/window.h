@@ -15,8 +15,9 @@
 #include <sgf/vio/prior.h>
 
 /// A window of frames and the landmarks that they see, refined together (Usenko, Demmel, Schubert,
-/// Stückler, Cremers, "Visual-inertial mapping with non-linear factor recovery", RA-L 2020; Leutenegger
-/// et al., "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR 2015).
+/// Stückler, Cremers, "Visual-inertial mapping with non-linear factor recovery", RA-L 2020;
+/// Leutenegger et al., "Keyframe-based visual-inertial odometry using nonlinear optimization", IJRR
+/// 2015).
 namespace sgf::vio {
 
 /// A frame of the window.
@@ -109,7 +110,8 @@ class Window {
   /// position (m).
   void AnchorPose(Frame& frame, const Eigen::Matrix<double, kPoseParameters, 1>& sigmas);
 
-  /// Holds an inertial frame's velocity and biases, with standard deviations in their order.
+  /// Makes a frame inertial and holds its motion, as it is now, with standard deviations of
+  /// velocity and biases.
   void AnchorMotion(Frame& frame, const Eigen::Matrix<double, kMotionParameters, 1>& sigmas);
 
   /// Forgets all that was known before, to be anchored anew.

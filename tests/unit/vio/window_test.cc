@@ -133,6 +133,24 @@ TEST(Window, RecoversStatesFromNoisyMeasurements) {
   EXPECT_NEAR(2 * summary.cost / degrees, 1, 0.1);
 }
 
+TEST(Window, IsAtTheMinimumAfterTheDefaultsIterations) {
+  // Tilt and biases are hard to tell apart, and must not lag behind for that.
+  SimulatedWindow quick = MakeWindow(0.5, {.window = {}}), patient = MakeWindow(0.5);
+  for (SimulatedWindow* simulated : {&quick, &patient})
+    for (int k = 0; k < 10; ++k) {
+      simulated->Push();
+      if (k == 0) {
+        Frame& first = simulated->window.frames[0];
+        first.state = Disturbed(first.state, AnchorSigmas(), 4);
+        simulated->window.Anchor(first, AnchorSigmas());
+      }
+      simulated->window.Refine();
+    }
+  const Frame &a = patient.window.frames.back(), &b = quick.window.frames.back();
+  const StateVector d = Minus(b.state, a.state);
+  EXPECT_LT(d.dot(patient.window.CovarianceOf(a).ldlt().solve(d)), 0.05);
+}
+
 TEST(Window, RecoversPosesWithoutInertialSensor) {
   SimulatedWindow simulated = MakeWindow(0.5);
   for (int k = 0; k < 8; ++k) {

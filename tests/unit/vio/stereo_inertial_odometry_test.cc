@@ -1,0 +1,437 @@
+#include <cmath>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <support/corner_world.h>
+#include <support/error_message.h>
+
+#include <sgf/vio/stereo_inertial_odometry.h>
+
+#include "unit/vio/flights.h"
+
+namespace sgf::vio {
+namespace {
+
+using Eigen::Vector3d;
+using testing::HasSubstr;
+
+const Camera kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+constexpr std::int64_t kPeriod = 50'000'000;  // ns
+constexpr int kImuPerFrame = 10;
+
+flow::StereoRig Rig() { return {kCamera, kCamera, {Eigen::Quaterniond::Identity(), {0.11, 0, 0}}}; }
+
+SE3 BodyLeft() { return {ExpSO3({0.02, -0.03, 0.05}), {0.03, 0.01, -0.02}}; }
+
+/// Before the corner of CornerWorld, whose z is the y of a world with z up.
+synth::TrajectoryOptions Ride() {
+  synth::TrajectoryOptions o;
+  o.waypoints = {{0, 0, 0, 90, 0, 0},         {0.4, 0.2, 0.1, 85, 4, 3},
+                 {0.5, 0.5, -0.2, 95, -3, 0}, {0.1, 0.3, -0.3, 97, 2, -4},
+                 {-0.4, 0, 0.1, 88, 0, 2},    {-0.2, -0.3, 0.2, 84, -4, 0}};
+  o.knot_interval_s = 1;
+  o.periodic = true;
+  return o;
+}
+
+/// CornerWorld's coordinates to the world's: z forwards to y, y down to -z.
+SE3 CornerPose() {
+  Eigen::Matrix3d R;
+  R << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  return {Eigen::Quaterniond(R), Vector3d::Zero()};
+}
+
+VioOptions Options() {
+  VioOptions options;
+  options.flow.cell_px = 30;
+  options.flow.levels = 3;
+  options.keyframes = 5;
+  return options;
+}
+
+const Flight& TestFlight() {
+  static const Flight flight(Ride(), 0, 6, [] {
+    synth::ImuOptions options;
+    options.initial_gyroscope_bias = {0.01, -0.02, 0.03};
+    options.initial_accelerometer_bias = {0.05, -0.03, 0.04};
+    return options;
+  }());
+  return flight;
+}
+
+/// Images of a frame; rendered once.
+const std::pair<cv::Mat1b, cv::Mat1b>& ImagesAt(int k) {
+  static std::map<int, std::pair<cv::Mat1b, cv::Mat1b>> cache;
+  if (!cache.contains(k)) {
+    const test::CornerWorld world(kCamera);
+    const SE3 left =
+        CornerPose().Inverse() * TestFlight().truth[k * kImuPerFrame].T_world_body * BodyLeft();
+    cache[k] = {world.Render(left).grey, world.Render(left * Rig().T_left_right).grey};
+  }
+  return cache.at(k);
+}
+
+/// A stereo camera and an inertial sensor on TestFlight().
+struct Ridden {
+  explicit Ridden(const VioOptions& options = Options())
+      : odometry(Rig(), BodyLeft(), ImuNoise(), options) {}
+
+  StereoInertialOdometry odometry;
+  std::vector<VioFrameResult> results = {};
+  size_t next_sample = 0;
+
+  std::int64_t TimeOf(int k) const { return TestFlight().truth[k * kImuPerFrame].time_ns; }
+
+  /// Samples up to a frame; `change` may spoil one, or leave it out by returning false.
+  template <class Change>
+  void Feed(int k, const Change& change) {
+    for (; next_sample <= static_cast<size_t>(k * kImuPerFrame); ++next_sample) {
+      ImuSample sample = TestFlight().samples[next_sample];
+      if (change(sample)) odometry.AddImu(sample);
+    }
+  }
+  void Feed(int k) {
+    Feed(k, [](ImuSample&) { return true; });
+  }
+
+  const VioFrameResult& Show(int k, const cv::Mat& left, const cv::Mat& right) {
+    results.push_back(odometry.Process(TimeOf(k), left, right));
+    const VioFrameResult& r = results.back();
+    EXPECT_TRUE(Minus(r.body, {}).allFinite()) << k;
+    EXPECT_TRUE(r.covariance.allFinite()) << k;
+    EXPECT_EQ(r.time_ns, TimeOf(k));
+    return r;
+  }
+  const VioFrameResult& Look(int k) { return Show(k, ImagesAt(k).first, ImagesAt(k).second); }
+  const VioFrameResult& Fly(int k) {
+    Feed(k);
+    return Look(k);
+  }
+  const VioFrameResult& FlyBlind(int k) {
+    Feed(k);
+    const cv::Mat1b black(kCamera.height, kCamera.width, uint8_t{0});
+    return Show(k, black, black);
+  }
+};
+
+/// Error of the motion from one result to another, m: a common motion of the world aside.
+double MotionError(const Ridden& flight, size_t from, size_t to) {
+  const auto pose = [&](size_t k, bool truth) {
+    const VioFrameResult& r = flight.results[k];
+    if (!truth) return r.body.T_world_body;
+    const auto n = (r.time_ns - Flight::kStart_ns + 2'500'000) / 5'000'000;
+    return TestFlight().truth[n].T_world_body;
+  };
+  const SE3 found = pose(from, false).Inverse() * pose(to, false);
+  const SE3 truth = pose(from, true).Inverse() * pose(to, true);
+  return (found.p - truth.p).norm();
+}
+
+/// When roll and pitch are known: the flight begins in motion.
+constexpr size_t kSettled = 10;
+
+void ExpectTracked(const Ridden& flight, double tolerance_m) {
+  for (size_t k = 0; k < flight.results.size(); ++k) {
+    EXPECT_EQ(flight.results[k].state, VioState::kTracked) << k;
+    EXPECT_LT(MotionError(flight, kSettled, k), k < kSettled ? 0.1 : tolerance_m) << k;
+  }
+}
+
+class FlightWith : public testing::TestWithParam<const char*> {};
+
+TEST_P(FlightWith, IsFollowed) {
+  VioOptions options = Options();
+  options.flow.residual = GetParam();
+  Ridden flight(options);
+  for (int k = 0; k < 60; ++k) flight.Fly(k);
+  ExpectTracked(flight, 0.03);
+  const VioFrameResult& last = flight.results.back();
+  const BodyState& truth = TestFlight().truth[59 * kImuPerFrame];
+  // z is up, whatever the yaw.
+  const Vector3d up = last.body.T_world_body.R.conjugate() * Vector3d::UnitZ();
+  EXPECT_LT((up - truth.T_world_body.R.conjugate() * Vector3d::UnitZ()).norm(), 0.02);
+  EXPECT_LT((last.body.T_world_body.R.conjugate() * last.body.velocity -
+             truth.T_world_body.R.conjugate() * truth.velocity)
+                .norm(),
+            0.05);
+  EXPECT_LT((last.body.gyro_bias - truth.gyro_bias).norm(), 0.005);
+  EXPECT_GT(last.landmarks, 20);
+  EXPECT_GT(last.stereo_tracks, 20);
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<StateMatrix>(last.covariance).eigenvalues()(0), 0);
+  int keyframes = 0;
+  for (const VioFrameResult& r : flight.results) keyframes += r.new_keyframe;
+  EXPECT_GT(keyframes, 2);
+  EXPECT_LT(keyframes, 30);
+  // Landmarks lie on the walls, in the world of the first frame.
+  const SE3 T_corner_world = CornerPose().Inverse() * TestFlight().truth[0].T_world_body *
+                             flight.results[0].body.T_world_body.Inverse();
+  const auto points = flight.odometry.ActivePoints();
+  ASSERT_GT(points.size(), 30u);
+  int on_wall = 0;
+  for (const VioPoint& point : points) {
+    const Vector3d p = T_corner_world * point.position;
+    on_wall += std::abs(p.z() - 4 + 0.5 * std::abs(p.x())) < 0.15;
+    EXPECT_GT(point.support, 0);
+  }
+  EXPECT_GT(on_wall, 0.8 * static_cast<double>(points.size()));
+}
+
+INSTANTIATE_TEST_SUITE_P(Dissimilarities, FlightWith, testing::Values("lssd", "ngv"));
+
+TEST(StereoInertialOdometry, FollowsImagesAlone) {
+  VioOptions options = Options();
+  options.inertial = false;
+  Ridden flight(options);
+  for (int k = 0; k < 40; ++k) flight.Look(k);
+  ExpectTracked(flight, 0.04);
+  EXPECT_EQ(flight.results.back().covariance.bottomRightCorner(9, 9).norm(), 0);
+  EXPECT_GT(flight.results.back().covariance(0, 0), 0);
+}
+
+TEST(StereoInertialOdometry, WaitsForTheSensor) {
+  Ridden flight;
+  for (int k = 0; k < 20; ++k) {
+    EXPECT_EQ(flight.Look(k).state, VioState::kInitialising);
+    EXPECT_GT(flight.results.back().tracks, 20);
+  }
+  EXPECT_TRUE(flight.odometry.ActivePoints().empty());
+}
+
+TEST(StereoInertialOdometry, UsesTheSensorFromWhenItComes) {
+  Ridden flight;
+  flight.next_sample = 5 * kImuPerFrame + 3;
+  for (int k = 0; k < 40; ++k) flight.Fly(k);
+  for (const VioFrameResult& r : flight.results)
+    EXPECT_EQ(r.state, r.time_ns < flight.TimeOf(6) ? VioState::kInitialising : VioState::kTracked);
+  EXPECT_LT(MotionError(flight, 16, 39), 0.04);
+  EXPECT_GT(flight.results.back().covariance(kVelocity, kVelocity), 0);
+  const BodyState& truth = TestFlight().truth[39 * kImuPerFrame];
+  const Vector3d up = flight.results.back().body.T_world_body.R.conjugate() * Vector3d::UnitZ();
+  EXPECT_LT((up - truth.T_world_body.R.conjugate() * Vector3d::UnitZ()).norm(), 0.03);
+}
+
+TEST(StereoInertialOdometry, GoesOnAfterAGapOfTheSensor) {
+  Ridden flight;
+  for (int k = 0; k < 40; ++k) {
+    flight.Feed(k, [&](const ImuSample& sample) {
+      return sample.time_ns < flight.TimeOf(15) || sample.time_ns > flight.TimeOf(25);
+    });
+    flight.Look(k);
+  }
+  ExpectTracked(flight, 0.04);
+  EXPECT_EQ(flight.odometry.imu_health().gaps, 1);
+  EXPECT_GT(flight.results[14].covariance(kVelocity, kVelocity), 0);
+  const VioFrameResult& last = flight.results.back();
+  EXPECT_GT(last.covariance(kVelocity, kVelocity), 0) << "the sensor is used again";
+  const BodyState& truth = TestFlight().truth[39 * kImuPerFrame];
+  EXPECT_LT((last.body.T_world_body.R.conjugate() * last.body.velocity -
+             truth.T_world_body.R.conjugate() * truth.velocity)
+                .norm(),
+            0.1);
+}
+
+TEST(StereoInertialOdometry, LeavesOutSamplesThatAreNone) {
+  Ridden flight;
+  int spoilt = 0;
+  for (int k = 0; k < 30; ++k) {
+    flight.Feed(k, [&](ImuSample& sample) {
+      if (sample.time_ns / 5'000'000 % 7 == 0) {
+        sample.gyro.y() = NAN;
+        ++spoilt;
+      } else if (sample.time_ns / 5'000'000 % 11 == 0) {
+        sample.accel.x() = INFINITY;
+        ++spoilt;
+      }
+      return true;
+    });
+    flight.Look(k);
+  }
+  ExpectTracked(flight, 0.04);
+  EXPECT_GT(spoilt, 30);
+  EXPECT_EQ(flight.odometry.imu_health().not_finite, spoilt);
+}
+
+TEST(StereoInertialOdometry, BearsEmptyRightImages) {
+  Ridden flight;
+  for (int k = 0; k < 45; ++k) {
+    flight.Feed(k);
+    flight.Show(k, ImagesAt(k).first, k >= 15 && k < 25 ? cv::Mat() : cv::Mat(ImagesAt(k).second));
+    EXPECT_EQ(flight.results.back().stereo_tracks == 0, k >= 15 && k < 25);
+  }
+  ExpectTracked(flight, 0.04);
+  // From the beginning on: one camera and the sensor.
+  Ridden mono;
+  for (int k = 0; k < 40; ++k) {
+    mono.Feed(k);
+    mono.Show(k, ImagesAt(k).first, {});
+    EXPECT_NE(mono.results.back().state, VioState::kLost);
+  }
+  EXPECT_EQ(mono.results.back().state, VioState::kTracked);
+}
+
+TEST(StereoInertialOdometry, PredictsWhereNothingIsSeenAndTracksAgain) {
+  Ridden flight;
+  for (int k = 0; k < 50; ++k) {
+    const bool black = k >= 20 && k < 30;
+    const VioFrameResult& r = black ? flight.FlyBlind(k) : flight.Fly(k);
+    if (k < 30 || k >= 33) {
+      EXPECT_EQ(r.state, black ? VioState::kPredicted : VioState::kTracked) << k;
+    }
+    if (k >= 10) {
+      EXPECT_LT(MotionError(flight, kSettled, k), 0.06) << k;
+    }
+    EXPECT_EQ(r.segment, 0);
+  }
+  const auto sigma = [&](int k) {
+    return std::sqrt(flight.results[k].covariance.block<3, 3>(kPosition, kPosition).trace());
+  };
+  EXPECT_GT(sigma(29), 2 * sigma(19)) << "less is known";
+}
+
+TEST(StereoInertialOdometry, IsLostAfterBeingBlindForLongAndBeginsAnew) {
+  VioOptions options = Options();
+  options.blind_s = 0.4;
+  Ridden flight(options);
+  for (int k = 0; k < 15; ++k) flight.Fly(k);
+  for (int k = 15; k < 40; ++k) {
+    const VioFrameResult& r = flight.FlyBlind(k);
+    const VioState expected = k < 23    ? VioState::kPredicted
+                              : k == 23 ? VioState::kLost
+                                        : VioState::kInitialising;
+    EXPECT_EQ(r.state, expected) << k << ": a map without landmarks predicts nothing";
+  }
+  for (int k = 40; k < 70; ++k) flight.Fly(k);
+  const VioFrameResult& last = flight.results.back();
+  EXPECT_EQ(last.state, VioState::kTracked);
+  EXPECT_EQ(last.segment, 1) << "one blindness, one new map";
+  EXPECT_LT(MotionError(flight, 55, 69), 0.04);
+  const BodyState& truth = TestFlight().truth[69 * kImuPerFrame];
+  EXPECT_LT((last.body.T_world_body.R.conjugate() * last.body.velocity -
+             truth.T_world_body.R.conjugate() * truth.velocity)
+                .norm(),
+            0.03);
+  for (const VioPoint& point : flight.odometry.ActivePoints())
+    EXPECT_EQ(point.segment, last.segment);
+  for (const VioPoint& point : flight.odometry.TakeFinishedPoints())
+    EXPECT_TRUE(point.position.allFinite());
+  EXPECT_TRUE(flight.odometry.TakeFinishedPoints().empty());
+}
+
+TEST(StereoInertialOdometry, RestsWithoutVelocityAfterItWasLost) {
+  // A body that is blind while it moves and at rest when it sees again.
+  VioOptions options = Options();
+  options.blind_s = 0.2;
+  StereoInertialOdometry odometry(Rig(), BodyLeft(), ImuNoise(), options);
+  const cv::Mat1b black(kCamera.height, kCamera.width, uint8_t{0});
+  const auto& [left, right] = ImagesAt(20);
+  const BodyState& at = TestFlight().truth[20 * kImuPerFrame];
+  ASSERT_GT(at.velocity.norm(), 0.1);
+  size_t next = 0;
+  for (int k = 0; k < 50; ++k) {
+    const std::int64_t time_ns = Flight::kStart_ns + k * kPeriod;
+    for (; next <= static_cast<size_t>(k * kImuPerFrame); ++next) {
+      ImuSample sample = TestFlight().samples[next];
+      if (k > 20) {
+        sample.gyro.setZero();
+        sample.accel = at.T_world_body.R.conjugate() * Vector3d(0, 0, 9.81);
+      }
+      odometry.AddImu(sample);
+    }
+    VioFrameResult r;
+    if (k <= 20)
+      r = odometry.Process(time_ns, ImagesAt(k).first, ImagesAt(k).second);
+    else
+      r = k < 30 ? odometry.Process(time_ns, black, black) : odometry.Process(time_ns, left, right);
+    if (k >= 32) {
+      EXPECT_EQ(r.state, VioState::kTracked) << k;
+      EXPECT_LT(r.body.velocity.norm(), 0.03) << k;
+    }
+  }
+}
+
+TEST(StereoInertialOdometry, RefusesBadInputAndGoesOn) {
+  Ridden flight;
+  for (int k = 0; k < 10; ++k) flight.Fly(k);
+  const auto refusal = [&](std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right) {
+    return ErrorMessage([&] { flight.odometry.Process(time_ns, left, right); });
+  };
+  const auto& [left, right] = ImagesAt(10);
+  for (const int k : {9, 5})
+    EXPECT_THAT(refusal(flight.TimeOf(k), left, right), HasSubstr("after"));
+  const std::int64_t next = flight.TimeOf(10);
+  EXPECT_THAT(refusal(next, {}, right), HasSubstr("left"));
+  EXPECT_THAT(refusal(next, cv::Mat1b(240, 321), right), HasSubstr("321x240"));
+  EXPECT_THAT(refusal(next, left, cv::Mat1b(10, 10)), HasSubstr("right"));
+  EXPECT_THAT(refusal(next, cv::Mat1f(240, 320), right), HasSubstr("8-bit"));
+  for (int k = 10; k < 25; ++k) flight.Fly(k);
+  ExpectTracked(flight, 0.03);
+  // As if nothing had been refused.
+  Ridden calm;
+  for (int k = 0; k < 25; ++k) calm.Fly(k);
+  EXPECT_EQ(Minus(calm.results.back().body, {}), Minus(flight.results.back().body, {}));
+}
+
+TEST(StereoInertialOdometry, IsTheSameForAnyNumberOfThreads) {
+  std::vector<std::vector<StateVector>> runs;
+  std::vector<StateMatrix> covariances;
+  for (const int threads : {1, 2}) {
+    VioOptions options = Options();
+    options.threads = threads;
+    Ridden flight(options);
+    auto& states = runs.emplace_back();
+    for (int k = 0; k < 30; ++k) states.push_back(Minus(flight.Fly(k).body, {}));
+    covariances.push_back(flight.results.back().covariance);
+  }
+  EXPECT_EQ(runs[0], runs[1]);
+  EXPECT_EQ(covariances[0], covariances[1]);
+}
+
+TEST(StereoInertialOdometry, KeepsAWindowOfBoundedSize) {
+  VioOptions options = Options();
+  options.keyframes = 2;
+  Ridden flight(options);
+  int finished = 0;
+  for (int k = 0; k < 60; ++k) {
+    flight.Fly(k);
+    finished += static_cast<int>(flight.odometry.TakeFinishedPoints().size());
+    EXPECT_LT(flight.odometry.ActivePoints().size(), 1000u);
+  }
+  EXPECT_GT(finished, 0);
+}
+
+TEST(StereoInertialOdometry, RefusesOptionsOutOfRange) {
+  const auto refusal = [](const auto& change) {
+    VioOptions options = Options();
+    change(options);
+    return ErrorMessage([&] { StereoInertialOdometry(Rig(), BodyLeft(), ImuNoise(), options); });
+  };
+  EXPECT_EQ(refusal([](auto&) {}), "no error");
+  EXPECT_THAT(refusal([](auto& o) { o.states = 1; }), HasSubstr("states"));
+  EXPECT_THAT(refusal([](auto& o) { o.states = 11; }), HasSubstr("states"));
+  EXPECT_THAT(refusal([](auto& o) { o.keyframes = 1; }), HasSubstr("keyframes"));
+  EXPECT_THAT(refusal([](auto& o) { o.keyframe_share = 0; }), HasSubstr("keyframe_share"));
+  EXPECT_THAT(refusal([](auto& o) { o.keyframe_gap = 0; }), HasSubstr("keyframe_gap"));
+  EXPECT_THAT(refusal([](auto& o) { o.least_parallax = NAN; }), HasSubstr("least_parallax"));
+  EXPECT_THAT(refusal([](auto& o) { o.least_sights = 2; }), HasSubstr("least_sights"));
+  EXPECT_THAT(refusal([](auto& o) { o.blind_s = -1; }), HasSubstr("blind_s"));
+  EXPECT_THAT(refusal([](auto& o) { o.start_s = 0; }), HasSubstr("start_s"));
+  EXPECT_THAT(refusal([](auto& o) { o.threads = -1; }), HasSubstr("threads"));
+  EXPECT_THAT(refusal([](auto& o) { o.window.sigma_px = 0; }), HasSubstr("window.sigma_px"));
+  EXPECT_THAT(refusal([](auto& o) { o.flow.levels = 0; }), HasSubstr("flow.levels"));
+  EXPECT_THAT(refusal([](auto& o) { o.flow.residual = "nothing"; }), HasSubstr("nothing"));
+  EXPECT_THAT(refusal([](auto& o) { o.imu.max_gap_s = 0; }), HasSubstr("max_gap_s"));
+}
+
+TEST(VioOptions, AreCheckedByName) {
+  VioOptions options;
+  options.blind_s = -2;
+  EXPECT_THAT(ErrorMessage([&] { CheckOptions(options); }),
+              testing::AllOf(HasSubstr("blind_s"), HasSubstr("-2")));
+}
+
+}  // namespace
+}  // namespace sgf::vio
