@@ -34,7 +34,7 @@ Nees Measure(int states, int keyframes, const SimulatedWindow::Options& options)
     for (int k = 0; k < kFrames; ++k) {
       // The truth is as likely, given where the first frame is held, as the anchor says.
       simulated.Push(Disturbed(simulated.TruthOf(0), AnchorSigmas(), 77 + run));
-      if (k == 0) window.Anchor(window.frames[0], AnchorSigmas());
+      if (k == 0) Anchor(window.frames[0], AnchorSigmas(), window);
       window.Refine();
       if (k + 1 < kFrames) simulated.Marginalize(states, keyframes);
     }

@@ -181,4 +181,10 @@ inline BodyState Disturbed(const BodyState& state, const StateVector& sigmas, st
   return Plus(state, d);
 }
 
+/// Holds a frame to what it is now, with standard deviations in the order of Plus().
+inline void Anchor(Frame& frame, const StateVector& sigmas, Window& window) {
+  window.AnchorPose(frame, sigmas.head<kPoseParameters>());
+  if (frame.inertial) window.AnchorMotion(frame, sigmas.tail<kMotionParameters>());
+}
+
 }  // namespace sgf::vio

@@ -90,7 +90,7 @@ TEST(Window, RecoversStatesFromExactMeasurements) {
   SimulatedWindow simulated = MakeWindow(0, {}, false);
   for (int k = 0; k < 8; ++k) {
     simulated.Push();
-    if (k == 0) simulated.window.Anchor(simulated.window.frames[0], WideSigmas());
+    if (k == 0) Anchor(simulated.window.frames[0], WideSigmas(), simulated.window);
   }
   simulated.window.frames[0].state = simulated.TruthOf(0);
   Disturb(simulated, 1);
@@ -119,7 +119,7 @@ TEST(Window, RecoversStatesFromNoisyMeasurements) {
   SimulatedWindow simulated = MakeWindow(0.5);
   for (int k = 0; k < 10; ++k) {
     simulated.Push();
-    if (k == 0) simulated.window.Anchor(simulated.window.frames[0], WideSigmas());
+    if (k == 0) Anchor(simulated.window.frames[0], WideSigmas(), simulated.window);
   }
   Disturb(simulated, 1);
   const WindowSummary summary = simulated.window.Refine();
@@ -142,7 +142,7 @@ TEST(Window, IsAtTheMinimumAfterTheDefaultsIterations) {
       if (k == 0) {
         Frame& first = simulated->window.frames[0];
         first.state = Disturbed(first.state, AnchorSigmas(), 4);
-        simulated->window.Anchor(first, AnchorSigmas());
+        Anchor(first, AnchorSigmas(), simulated->window);
       }
       simulated->window.Refine();
     }
@@ -158,7 +158,7 @@ TEST(Window, RecoversPosesWithoutInertialSensor) {
     Frame& frame = simulated.window.frames.back();
     frame.inertial = false;
     frame.since_last.reset();
-    if (k == 0) simulated.window.Anchor(frame, StateVector::Constant(1e-4));
+    if (k == 0) Anchor(frame, StateVector::Constant(1e-4), simulated.window);
   }
   Disturb(simulated, 1);
   EXPECT_TRUE(simulated.window.Refine().usable);
@@ -174,7 +174,7 @@ TEST(Window, AnchorsRotationsAboutTheAxesOfTheWorld) {
   StateVector sigmas = AnchorSigmas();
   sigmas.head<3>() << 0.1, 0.2, 1e-3;
   Frame& frame = simulated.window.frames[0];
-  simulated.window.Anchor(frame, sigmas);
+  Anchor(frame, sigmas, simulated.window);
   const StateMatrix covariance = simulated.window.CovarianceOf(frame);
   const Eigen::Matrix3d R = frame.state.T_world_body.R.toRotationMatrix();
   const Eigen::Matrix3d world = R * covariance.topLeftCorner<3, 3>() * R.transpose();
@@ -187,7 +187,7 @@ TEST(Window, TakesOutWrongSights) {
   SimulatedWindow simulated = MakeWindow(0.3);
   for (int k = 0; k < 8; ++k) {
     simulated.Push();
-    if (k == 0) simulated.window.Anchor(simulated.window.frames[0], WideSigmas());
+    if (k == 0) Anchor(simulated.window.frames[0], WideSigmas(), simulated.window);
   }
   Window& window = simulated.window;
   window.Refine();
@@ -243,7 +243,7 @@ TEST(Window, KeepsWhatMarginalizedFramesSaid) {
   for (SimulatedWindow* simulated : {&batch, &sliding}) {
     for (int k = 0; k < 12; ++k) {
       simulated->Push();
-      if (k == 0) simulated->window.Anchor(simulated->window.frames[0], AnchorSigmas());
+      if (k == 0) Anchor(simulated->window.frames[0], AnchorSigmas(), simulated->window);
       simulated->window.Refine();
     }
     // Gone are frame 0 with all of its landmarks, frame 1, and motions of 2 and 3.
@@ -272,7 +272,7 @@ TEST(Window, ForgetsNoUncertaintyThroughManyMarginalizations) {
   for (int k = 0; k < 30; ++k) {
     simulated.Push();
     Window& window = simulated.window;
-    if (k == 0) window.Anchor(window.frames[0], AnchorSigmas());
+    if (k == 0) Anchor(window.frames[0], AnchorSigmas(), window);
     window.Refine();
     window.RemoveOutliers();
     simulated.Marginalize(3, 3);
@@ -343,7 +343,7 @@ TEST(Window, IsTheSameForAnyNumberOfThreads) {
     auto& states = runs.emplace_back();
     for (int k = 0; k < 12; ++k) {
       simulated.Push();
-      if (k == 0) simulated.window.Anchor(simulated.window.frames[0], AnchorSigmas());
+      if (k == 0) Anchor(simulated.window.frames[0], AnchorSigmas(), simulated.window);
       simulated.window.Refine();
       simulated.Marginalize(3, 2);
       states.push_back(Minus(simulated.window.frames.back().state, {}));
