@@ -199,7 +199,7 @@ run_experiments() {
   mapfile -t mrpt < <(mrpt_programs)
   ((${#mrpt[@]})) ||
     printf '  the MRPT module and what it shows are left out; why: %s\n' "$logs/configure.log"
-  build release sgf_align sgf_direct sgf_eval sgf_render sgf_stereo sgf_study stereo_bench "${mrpt[@]}"
+  build release sgf_align sgf_direct sgf_eval sgf_render sgf_stereo sgf_study sgf_vio stereo_bench "${mrpt[@]}"
   cd paper
   exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${runs[@]}" \
     "${stages[@]}"

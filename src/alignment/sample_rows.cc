@@ -17,8 +17,8 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Calls body(d, x) for vectors d of pixels from x on, so that all of [0, width) is covered. The last
-// vector may overlap the one before.
+// Calls body(d, x) for vectors d of pixels from x on, so that all of [0, width) is covered. The
+// last vector may overlap the one before.
 template <class Body>
 HWY_INLINE void OverRow(int width, const Body& body) {
   const hn::ScalableTag<float> d;
@@ -94,7 +94,8 @@ double SumSquared(const GreyRows& rows, const GradientTaps& taps) {
   float sums[kSums] = {};
   for (size_t x = 0; x < squares.size(); x += kSums)
     for (size_t k = 0; k < kSums; k += lanes)
-      hn::StoreU(hn::Add(hn::LoadU(d, sums + k), hn::LoadU(d, squares.data() + x + k)), d, sums + k);
+      hn::StoreU(hn::Add(hn::LoadU(d, sums + k), hn::LoadU(d, squares.data() + x + k)), d,
+                 sums + k);
   double sum = 0;
   for (const float part : sums) sum += part;
   return sum;

@@ -27,14 +27,14 @@ void CheckChange(const SequenceChange& change) {
   if (!(change.period_s > 0))
     throw Error("period_s", fmt::format("is {}; it has to be positive", change.period_s));
   if (!(change.light_period_s > 0))
-    throw Error("light_period_s", fmt::format("is {}; it has to be positive", change.light_period_s));
+    throw Error("light_period_s",
+                fmt::format("is {}; it has to be positive", change.light_period_s));
   CheckChange(ChangeAt(change, 0));
 }
 
 bool ChangesNothing(const SequenceChange& change) {
   return change.exposure_low == 1 && change.exposure_high == 1 && change.vignette == 0 &&
-         change.light == 0 &&
-         (change.gamma == 1 || change.encode);
+         change.light == 0 && (change.gamma == 1 || change.encode);
 }
 
 ImageChange ChangeAt(const SequenceChange& change, std::int64_t elapsed_ns) {

@@ -50,14 +50,22 @@ class EventLog {
       Write(frame, result, "keyframe",
             {{"tracks", result.tracks}, {"landmarks", result.landmarks}});
     if (result.state != state_) Write(frame, result, EnumName(result.state), {});
+    if (result.problem != problem_ && result.problem != vio::InitialisationProblem::kNone) {
+      Write(frame, result, "no_start", {{"problem", EnumName(result.problem)}});
+      spdlog::warn("the inertial sensor takes no part yet: {}", vio::Explain(result.problem));
+    }
+    if (result.inertial != inertial_)
+      Write(frame, result, result.inertial ? "inertial" : "visual", {});
+    problem_ = result.problem;
+    inertial_ = result.inertial;
     state_ = result.state;
   }
 
   void Dropped(int frame, std::int64_t time_ns) {
-    file_.Write(nlohmann::ordered_json(
-                    {{"frame", frame}, {"time_ns", time_ns}, {"event", "dropped"}})
-                    .dump() +
-                "\n");
+    file_.Write(
+        nlohmann::ordered_json({{"frame", frame}, {"time_ns", time_ns}, {"event", "dropped"}})
+            .dump() +
+        "\n");
   }
 
   /// @throws Error if any line could not be written.
@@ -76,14 +84,16 @@ class EventLog {
 
   AtomicFile file_;
   std::optional<vio::VioState> state_;
+  vio::InitialisationProblem problem_ = vio::InitialisationProblem::kNone;
+  bool inertial_ = false;
 };
 
 class PointFile {
  public:
   explicit PointFile(const fs::path& file)
-      : writer_(file,
-                "z up, world of trajectory.txt, m; variance: of the inverse depth over its square") {
-  }
+      : writer_(
+            file,
+            "z up, world of trajectory.txt, m; variance: of the inverse depth over its square") {}
 
   void Add(const std::vector<vio::VioPoint>& points) {
     for (const vio::VioPoint& point : points) {
@@ -108,6 +118,7 @@ class PointFile {
 struct Run {
   std::vector<vio::VioFrameResult> frames;
   int dropped = 0;
+  double clipped_share = 0;
   vio::ImuHealth imu;
 };
 
@@ -168,9 +179,9 @@ Run TrackSequence(const OdometrySequence& sequence, std::span<const OdometryFram
       events.Dropped(static_cast<int>(k), frame.time_ns);
       continue;
     }
-    const auto result = odometry.Process(frame.time_ns,
-                                         load(frame.left, frame.time_ns, cameras[0].camera),
-                                         load(frame.right, frame.time_ns, cameras[1].camera));
+    const auto result =
+        odometry.Process(frame.time_ns, load(frame.left, frame.time_ns, cameras[0].camera),
+                         load(frame.right, frame.time_ns, cameras[1].camera));
     real_time.Took(frames[0], frame, result.times.total_s);
     run.frames.push_back(result);
     points.Add(odometry.TakeFinishedPoints());
@@ -179,6 +190,7 @@ Run TrackSequence(const OdometrySequence& sequence, std::span<const OdometryFram
   }
   points.Add(odometry.ActivePoints());
   run.imu = odometry.imu_health();
+  run.clipped_share = load.clipped_share();
   return run;
 }
 
@@ -239,6 +251,7 @@ void WriteSummary(const fs::path& file, const OdometrySequence& sequence, size_t
       {"skipped", sequence.skipped_frames},
       {"keyframes", keyframes},
       {"points", points},
+      {"clipped_share", run.clipped_share},
       {"imu",
        {{"taken", run.imu.taken},
         {"duplicates", run.imu.duplicates},
@@ -287,7 +300,8 @@ int main(int argc, char** argv) {
   using namespace sgf;
   apps::Arguments arguments;
   CLI::App app(
-      "Stereo-inertial odometry: writes trajectory.txt (TUM format: the body's pose at each frame's "
+      "Stereo-inertial odometry: writes trajectory.txt (TUM format: the body's pose at each "
+      "frame's "
       "time, as known then), states.csv (velocity, biases and deviations), points.ply, "
       "events.jsonl, timings.csv, summary.json and options.yaml.",
       "sgf_vio");

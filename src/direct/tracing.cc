@@ -223,7 +223,8 @@ class DepthEstimatorOf : public DepthEstimator {
     // Costs only have to be told apart up to where the best one is unambiguous.
     float enough = kInfinite;
     for (int k = 0; k < steps; ++k) {
-      costs[k] = Cost(image, patch, line.from + static_cast<float>(k) * step, shape, line.A, enough);
+      costs[k] =
+          Cost(image, patch, line.from + static_cast<float>(k) * step, shape, line.A, enough);
       enough = std::min(enough, static_cast<float>(options_.min_quality) * costs[k]);
     }
     const int best =

@@ -160,8 +160,8 @@ class StereoFlow::Impl {
     });
   }
 
-  void TrackAll(const std::optional<Eigen::Quaterniond>& R_cur_last,
-                const ExpectedPixels& expected, FlowFrame& frame) {
+  void TrackAll(const std::optional<Eigen::Quaterniond>& R_cur_last, const ExpectedPixels& expected,
+                FlowFrame& frame) {
     ParallelForBatches(int(tracks_.size()), options_.threads, [&](int k) {
       Track& track = tracks_[size_t(k)];
       const auto place = expected.find(track.id);

@@ -60,7 +60,8 @@ class StereoInertialOdometry::Impl {
     Stopwatch total, stage;
     VioFrameResult result{.time_ns = time_ns, .segment = segment_};
     Frame frame = Predict(time_ns);
-    const flow::FlowFrame seen = flow_.Process(time_ns, left, right, RotationSinceLast(frame), Expected(frame));
+    const flow::FlowFrame seen =
+        flow_.Process(time_ns, left, right, RotationSinceLast(frame), Expected(frame));
     result.flow = seen.times;
     result.times.flow_s = stage.Lap();
     result.tracks = static_cast<int>(seen.observations.size());
@@ -195,7 +196,7 @@ class StereoInertialOdometry::Impl {
     if (found.ok()) {
       BodyState rest = found.states.back();
       found.states.assign(start_.size(), rest);  // the same all the time
-      found.T_world_visual = {};  // the first attitude is that of rest
+      found.T_world_visual = {};                 // the first attitude is that of rest
     } else {
       found = InitializeMoving(start_, imu_, options_.start);
     }
@@ -214,7 +215,8 @@ class StereoInertialOdometry::Impl {
       frame.state.T_world_body = found.T_world_visual * frame.state.T_world_body;
       if (k < first) continue;
       frame.inertial = true;
-      frame.state.velocity = found.states[found.states.size() - (window_.frames.size() - k)].velocity;
+      frame.state.velocity =
+          found.states[found.states.size() - (window_.frames.size() - k)].velocity;
       frame.state.gyro_bias = last_found.gyro_bias;
       frame.state.accel_bias = last_found.accel_bias;
       if (k > first)
@@ -480,7 +482,7 @@ class StereoInertialOdometry::Impl {
   static constexpr double kHeld = 1e-4;  ///< rad, m: standard deviation of what is held
   BodyState last_;
   Eigen::Quaterniond R_gravity_world_ = Eigen::Quaterniond::Identity();
-  bool inertial_ = false;        ///< the inertial sensor takes part
+  bool inertial_ = false;         ///< the inertial sensor takes part
   std::vector<TimedPose> start_;  ///< poses of images alone before that
   int next_id_ = 0;
   int since_keyframe_ = 0;

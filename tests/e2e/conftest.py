@@ -39,16 +39,17 @@ def drop_extra_columns(file):
     file.write_text(yaml.safe_dump(sweep, default_flow_style=None, sort_keys=False))
 
 
-def shorten_runs(file, kept):
-    """Keeps one of the rendered sequences, two columns, and one run."""
+def shorten_runs(file, kept, baseline="photo"):
+    """Keeps one of the rendered sequences, two columns, two conditions, and one run."""
     study = yaml.safe_load(file.read_text())
     rendered = [name for name, sequence in study["sequences"].items() if "rendered" in sequence]
+    study["conditions"].pop("local_light", None)
     for name in set(rendered) - {kept}:
         del study["sequences"][name]
         for condition in study["conditions"].values():
             condition.get("changes", {}).pop(name, None)
-    study |= {"runs": 1, "compared": ["sgf"], "baselines": ["photo"]}
-    study["columns"] = {name: study["columns"][name] for name in ("sgf", "photo")}
+    study |= {"runs": 1, "compared": ["sgf"], "baselines": [baseline]}
+    study["columns"] = {name: study["columns"][name] for name in ("sgf", baseline)}
     title = study.pop("title")  # reproduce.sh reads it in double quotes
     file.write_text(f'title: "{title}"\n{yaml.safe_dump(study, sort_keys=False)}')
 
@@ -78,6 +79,7 @@ class Project:
         shorten_runs(experiments / "odometry.yaml", "V1_03_difficult")
         for name in ("odometry_parts", "table3"):
             shorten_runs(experiments / f"{name}.yaml", "MH_03_medium")
+        shorten_runs(experiments / "table3_vio.yaml", "MH_03_medium", "lssd")
         light_change = experiments / "light_change.yaml"
         light_change.write_text(light_change.read_text().replace(", census]", "]"))
 

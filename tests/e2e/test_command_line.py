@@ -7,7 +7,7 @@ import pytest
 from conftest import PROJECT
 
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
-PROGRAMS = "sgf_align sgf_direct sgf_eval sgf_render sgf_stereo sgf_study stereo_bench"
+PROGRAMS = "sgf_align sgf_direct sgf_eval sgf_render sgf_stereo sgf_study sgf_vio stereo_bench"
 MRPT_PROGRAMS = "dataset2rawlog sgf-odometry-cli"
 APT_LINE = "sudo apt-get update && sudo apt-get install -y --no-install-recommends "
 

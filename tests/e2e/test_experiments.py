@@ -13,7 +13,7 @@ COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_co
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 ODOMETRY = ["odometry", "odometry_parts"]
-TRACKED = [*ODOMETRY, "table3"]
+TRACKED = [*ODOMETRY, "table3", "table3_vio"]
 # These need no data set.
 RENDERED = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "scenes", "sequences"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
@@ -28,7 +28,7 @@ FILES = {
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
     + ["convergence.csv", "convergence.md", "fig6.csv", "fig6.md", "mrpt_map.csv", "mrpt_map.md"]
     + [f"{name}{end}" for name in TRACKED for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
-    + ["table3.tex"]
+    + ["table3.tex", "table3_vio.tex"]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }

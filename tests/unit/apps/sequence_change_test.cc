@@ -43,11 +43,14 @@ TEST(SequenceChange, SeedsDiffer) {
 }
 
 TEST(SequenceChange, RefusesWhatIsOutOfRange) {
-  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.light_period_s = 0}); }).find("light_period_s"),
+  EXPECT_NE(
+      ErrorMessage([] { CheckChange(SequenceChange{.light_period_s = 0}); }).find("light_period_s"),
+      std::string::npos);
+  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.light = -1}); }).find("light"),
             std::string::npos);
-  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.light = -1}); }).find("light"), std::string::npos);
-  EXPECT_NE(ErrorMessage([] { CheckChange(SequenceChange{.exposure_low = 2}); }).find("exposure_low"),
-            std::string::npos);
+  EXPECT_NE(
+      ErrorMessage([] { CheckChange(SequenceChange{.exposure_low = 2}); }).find("exposure_low"),
+      std::string::npos);
 }
 
 }  // namespace
