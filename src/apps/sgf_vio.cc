@@ -54,10 +54,10 @@ class EventLog {
   }
 
   void Dropped(int frame, std::int64_t time_ns) {
-    file_.Write(nlohmann::ordered_json(
-                    {{"frame", frame}, {"time_ns", time_ns}, {"event", "dropped"}})
-                    .dump() +
-                "\n");
+    file_.Write(
+        nlohmann::ordered_json({{"frame", frame}, {"time_ns", time_ns}, {"event", "dropped"}})
+            .dump() +
+        "\n");
   }
 
   /// @throws Error if any line could not be written.
@@ -81,9 +81,9 @@ class EventLog {
 class PointFile {
  public:
   explicit PointFile(const fs::path& file)
-      : writer_(file,
-                "z up, world of trajectory.txt, m; variance: of the inverse depth over its square") {
-  }
+      : writer_(
+            file,
+            "z up, world of trajectory.txt, m; variance: of the inverse depth over its square") {}
 
   void Add(const std::vector<vio::VioPoint>& points) {
     for (const vio::VioPoint& point : points) {
@@ -168,9 +168,9 @@ Run TrackSequence(const OdometrySequence& sequence, std::span<const OdometryFram
       events.Dropped(static_cast<int>(k), frame.time_ns);
       continue;
     }
-    const auto result = odometry.Process(frame.time_ns,
-                                         load(frame.left, frame.time_ns, cameras[0].camera),
-                                         load(frame.right, frame.time_ns, cameras[1].camera));
+    const auto result =
+        odometry.Process(frame.time_ns, load(frame.left, frame.time_ns, cameras[0].camera),
+                         load(frame.right, frame.time_ns, cameras[1].camera));
     real_time.Took(frames[0], frame, result.times.total_s);
     run.frames.push_back(result);
     points.Add(odometry.TakeFinishedPoints());
@@ -287,7 +287,8 @@ int main(int argc, char** argv) {
   using namespace sgf;
   apps::Arguments arguments;
   CLI::App app(
-      "Stereo-inertial odometry: writes trajectory.txt (TUM format: the body's pose at each frame's "
+      "Stereo-inertial odometry: writes trajectory.txt (TUM format: the body's pose at each "
+      "frame's "
       "time, as known then), states.csv (velocity, biases and deviations), points.ply, "
       "events.jsonl, timings.csv, summary.json and options.yaml.",
       "sgf_vio");

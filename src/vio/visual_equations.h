@@ -14,8 +14,8 @@ namespace sgf::vio {
 struct LandmarkItem {
   Landmark* landmark = nullptr;
   int host = 0;
-  std::vector<int> frames = {};            ///< of each sight
-  Eigen::Vector3d value = {0, 0, 0};       ///< ray and inverse depth now
+  std::vector<int> frames = {};               ///< of each sight
+  Eigen::Vector3d value = {0, 0, 0};          ///< ray and inverse depth now
   Eigen::Vector3d linearization = {0, 0, 0};  ///< at the last linearisation
   Eigen::Matrix3d H_inverse = Eigen::Matrix3d::Zero();
   Eigen::Vector3d b = Eigen::Vector3d::Zero();
