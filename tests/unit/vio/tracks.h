@@ -90,7 +90,7 @@ class SimulatedWindow {
     WindowOptions window = {.max_iterations = 20, .tolerance = 1e-9};
     int keyframe_gap = 3;
     int threads = 1;
-    /// As if a landmark that comes again had not been seen before: sights count once.
+    /// A landmark that comes again brings its older sights, though the prior may know them.
     bool reuse_sights = false;
   };
 
