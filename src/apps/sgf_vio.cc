@@ -100,7 +100,7 @@ class PointFile {
       const Eigen::Vector3f p = point.position.cast<float>();
       const double relative =
           point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
-      writer_.Add({{p.x(), p.y(), p.z()}, 255, static_cast<float>(relative), point.support});
+      writer_.Add({{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support});
     }
   }
 

@@ -73,7 +73,7 @@ class StereoInertialOdometry::Impl {
     window_.frames.push_back(std::move(frame));
     Observe(seen);
     const bool blind = window_.frames.size() > 1 && CountSeen() < options_.least_sights;
-    if (NeedsKeyframe(seen)) MakeKeyframe(seen, result);
+    if (NeedsKeyframe(seen)) MakeKeyframe(seen, left, result);
     result.landmarks = CountSeen();
     Refine(blind, result);
     ToWorld(result);
@@ -188,22 +188,40 @@ class StereoInertialOdometry::Impl {
   /// Lets the inertial sensor take part as soon as it can be told where down is.
   void Start(VioFrameResult& result) {
     start_.push_back({result.time_ns, window_.frames.back().state.T_world_body});
+    // Poses from before the sensor's first sample, or from before a gap, say nothing of it.
+    while (start_.size() > 1 && !imu_.Covers(start_.front().time_ns, result.time_ns))
+      start_.erase(start_.begin());
+    if (!imu_.Covers(start_.front().time_ns, result.time_ns))
+      result.problem = InitialisationProblem::kTooLittleData;
     const double span_s = 1e-9 * static_cast<double>(result.time_ns - start_.front().time_ns);
     const auto states = static_cast<size_t>(options_.states);
     if (span_s < options_.start_s || window_.frames.size() < states) return;
     InertialInitialisation found =
-        InitializeAtRest(imu_, start_.front().time_ns, result.time_ns, options_.start);
-    if (found.ok()) {
-      BodyState rest = found.states.back();
-      found.states.assign(start_.size(), rest);  // the same all the time
-      found.T_world_visual = {};                 // the first attitude is that of rest
-    } else {
-      found = InitializeMoving(start_, imu_, options_.start);
-    }
+        IsAtRest() ? StartAtRest(result.time_ns) : InitializeMoving(start_, imu_, options_.start);
     result.problem = found.problem;
     constexpr double kLongest = 5;  // times the span: what came first is not needed for ever
     if (!found.ok() && span_s > kLongest * options_.start_s) start_.erase(start_.begin());
     if (found.ok()) TakeOver(found);
+  }
+
+  /// As the images have it: the inertial sensor cannot tell rest from constant velocity.
+  bool IsAtRest() const {
+    constexpr double kLeastMotion_m = 0.02, kLeastTurn_rad = 0.01;
+    return std::all_of(start_.begin(), start_.end(), [&](const TimedPose& pose) {
+      const SE3 motion = start_.front().pose.Inverse() * pose.pose;
+      return motion.p.norm() < kLeastMotion_m && LogSO3(motion.R).norm() < kLeastTurn_rad;
+    });
+  }
+
+  InertialInitialisation StartAtRest(std::int64_t time_ns) const {
+    InertialInitialisation found =
+        InitializeAtRest(imu_, start_.front().time_ns, time_ns, options_.start);
+    if (!found.ok()) return found;
+    const Vector3d up_body = found.states.back().T_world_body.R.conjugate() * Vector3d::UnitZ();
+    found.T_world_visual.R =
+        Eigen::Quaterniond::FromTwoVectors(start_.back().pose.R * up_body, Vector3d::UnitZ());
+    found.states.assign(start_.size(), BodyState(found.states.back()));  // the same all the time
+    return found;
   }
 
   void TakeOver(const InertialInitialisation& found) {
@@ -242,11 +260,7 @@ class StereoInertialOdometry::Impl {
   void ResumeInertial(Frame& frame) {
     Frame& last = window_.frames.back();
     constexpr double kVelocitySigma = 1;  // m/s
-    if (const size_t count = window_.frames.size(); count >= 2) {
-      const BodyState& before = window_.frames[count - 2].state;
-      const double dt_s = 1e-9 * static_cast<double>(last.state.time_ns - before.time_ns);
-      last.state.velocity = (last.state.T_world_body.p - before.T_world_body.p) / dt_s;
-    }
+    last.state.velocity = SeenVelocity();
     Eigen::Matrix<double, kMotionParameters, 1> sigmas;
     constexpr double kGyroBiasSigma = 0.01;  // rad/s
     sigmas << Vector3d::Constant(kVelocitySigma), Vector3d::Constant(kGyroBiasSigma),
@@ -303,14 +317,16 @@ class StereoInertialOdometry::Impl {
   }
 
   /// Tracks without a landmark become one of the newest frame, where two rays tell its depth.
-  void MakeKeyframe(const flow::FlowFrame& seen, VioFrameResult& result) {
+  void MakeKeyframe(const flow::FlowFrame& seen, const cv::Mat1b& left, VioFrameResult& result) {
     Frame& frame = window_.frames.back();
     frame.keyframe = result.new_keyframe = true;
     for (const flow::FlowObservation& at : seen.observations) {
       const auto track = tracks_.find(at.id);
       if (track == tracks_.end() || window_.landmarks.contains(at.id)) continue;
-      if (auto landmark = MakeLandmark(frame, track->second))
+      if (auto landmark = MakeLandmark(frame, track->second)) {
+        landmark->grey = left(static_cast<int>(at.left_px.y()), static_cast<int>(at.left_px.x()));
         window_.landmarks.emplace(at.id, std::move(*landmark));
+      }
     }
   }
 
@@ -346,14 +362,15 @@ class StereoInertialOdometry::Impl {
       result.window.outliers = window_.RemoveOutliers();
     }
     const double blind_s = 1e-9 * static_cast<double>(newest.state.time_ns - last_sight_ns_);
-    if (!first && !result.window.usable) {
+    if (window_.landmarks.empty() && !inertial_) {
+      result.state = VioState::kInitialising;
+    } else if (!first && !result.window.usable) {
       result.state = VioState::kLost;
     } else if (blind) {
       result.state =
           newest.inertial && blind_s <= options_.blind_s ? VioState::kPredicted : VioState::kLost;
     } else {
-      result.state =
-          first && window_.landmarks.empty() ? VioState::kInitialising : VioState::kTracked;
+      result.state = VioState::kTracked;
       last_sight_ns_ = newest.state.time_ns;
     }
     result.body = last_;
@@ -361,8 +378,18 @@ class StereoInertialOdometry::Impl {
     if (result.state == VioState::kLost) return;
     since_keyframe_ = result.new_keyframe ? 0 : since_keyframe_ + 1;
     last_ = newest.state;
+    if (!newest.inertial) last_.velocity = SeenVelocity();
     result.body = last_;
     if (options_.covariance) result.covariance = window_.CovarianceOf(newest);
+  }
+
+  /// Velocity from the last two poses, m/s.
+  Vector3d SeenVelocity() const {
+    const size_t count = window_.frames.size();
+    if (count < 2) return Vector3d::Zero();
+    const BodyState &before = window_.frames[count - 2].state, &now = window_.frames.back().state;
+    const double dt_s = 1e-9 * static_cast<double>(now.time_ns - before.time_ns);
+    return (now.T_world_body.p - before.T_world_body.p) / dt_s;
   }
 
   /// From the window's world, whose z points up, to that of the trajectory.
@@ -376,10 +403,9 @@ class StereoInertialOdometry::Impl {
     result.covariance = turn * result.covariance * turn.transpose();
   }
 
-  /// Neither a landmark nor enough tracks to make some of: no map to predict from.
+  /// Without a landmark there is no map to predict from.
   bool SeesNothingYet(const VioFrameResult& result) const {
-    return result.state == VioState::kInitialising &&
-           static_cast<int>(tracks_.size()) < options_.least_sights;
+    return result.state == VioState::kInitialising && window_.landmarks.empty();
   }
 
   /// A new map begins at the last believed state.
@@ -469,6 +495,7 @@ class StereoInertialOdometry::Impl {
             .inverse_depth = landmark.inverse_depth,
             .inverse_depth_variance = landmark.inverse_depth_variance,
             .support = static_cast<int>(landmark.sights.size()),
+            .grey = landmark.grey,
             .segment = segment_};
   }
 

@@ -46,6 +46,7 @@ struct Landmark {
   Eigen::Vector2d ray = Eigen::Vector2d::Zero();
   double inverse_depth = 0;  ///< 1/m
   double inverse_depth_variance = 0;
+  float grey = 0;  ///< of its pixel, grey levels
   std::vector<LandmarkSight> sights = {};
 };
 

@@ -49,20 +49,5 @@ TEST(Prior, AddsWhatItIsGivenToTheRightFrames) {
   EXPECT_EQ(prior.b()(prior.OffsetOf(2)), 2);
 }
 
-TEST(SquareRootOf, IsTheSameQuadratic) {
-  const Quadratic q = RandomQuadratic();
-  const SquareRoot root = SquareRootOf(q.H, q.b);
-  EXPECT_LT((root.S.transpose() * root.S - q.H).norm(), 1e-8 * q.H.norm());
-  EXPECT_LT((root.S.transpose() * root.e - q.b).norm(), 1e-8 * q.b.norm());
-}
-
-TEST(SquareRootOf, LeavesOutWhatIsNotKnown) {
-  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(n, n);
-  H(1, 1) = 4;
-  const SquareRoot root = SquareRootOf(H, FrameParameters::Zero());
-  EXPECT_EQ(root.S.rows(), 1);
-  EXPECT_NEAR((root.S.transpose() * root.S - H).norm(), 0, 1e-9);
-}
-
 }  // namespace
 }  // namespace sgf::direct
