@@ -271,6 +271,19 @@ std::deque<InertialCost> InertialCosts(const Linearization& at, double gravity) 
   return costs;
 }
 
+ceres::Solver::Options SolverOptions(const WindowOptions& window) {
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = window.max_iterations;
+  options.function_tolerance = window.tolerance;
+  // Nearly Gauss-Newton. Tilt, velocity and biases are known by 1e-4 of what single numbers are
+  // when the rest is held: with Ceres' 1e4 they would lag behind by many frames.
+  options.initial_trust_region_radius = 1e8;
+  options.num_threads = 1;  // the order of sums must not depend on them
+  options.logging_type = ceres::SILENT;
+  return options;
+}
+
 /// A cost as rows of [S e] in its blocks, at the parameters as they are.
 SquareRoot RowsOf(const ceres::CostFunction& cost, std::span<const BlockId> blocks,
                   const Linearization& at) {
@@ -293,6 +306,27 @@ SquareRoot RowsOf(const ceres::CostFunction& cost, std::span<const BlockId> bloc
     result.e -= J[k] * at.x().segment(at.OffsetOf(blocks[k]), blocks[k].size());
   }
   return result;
+}
+
+/// Adds what landmarks say to a prior of the frames that see them; other frames stay out of it.
+void AddLandmarks(const VisualEquations& equations, Linearization& at,
+                  std::map<std::int64_t, Landmark>& landmarks, SquareRootPrior& prior) {
+  if (landmarks.empty()) return;
+  std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
+  std::vector<BlockId> blocks;
+  for (const Frame& frame : at.frames()) blocks.push_back({frame.id, false});
+  const SquareRoot rows = RowsOf(VisualCost(equations, at, items), blocks, at);
+  std::vector<BlockId> touched;
+  MatrixXd S(rows.S.rows(), 0);
+  for (size_t k = 0; k < blocks.size(); ++k) {
+    const auto columns =
+        rows.S.middleCols<kPoseParameters>(kPoseParameters * static_cast<Index>(k));
+    if (columns.squaredNorm() == 0) continue;
+    touched.push_back(blocks[k]);
+    S.conservativeResize(Eigen::NoChange, S.cols() + kPoseParameters);
+    S.rightCols<kPoseParameters>() = columns;
+  }
+  prior.Add(touched, S, rows.e);
 }
 
 }  // namespace
@@ -383,17 +417,8 @@ WindowSummary Window::Refine() {
     problem.AddResidualBlock(&prior, nullptr, blocks);
   }
 
-  ceres::Solver::Options options;
-  options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = options_.max_iterations;
-  options.function_tolerance = options_.tolerance;
-  // Nearly Gauss-Newton. Tilt, velocity and biases are known by 1e-4 of what single numbers are
-  // when the rest is held: with Ceres' 1e4 they would lag behind by many frames.
-  options.initial_trust_region_radius = 1e8;
-  options.num_threads = 1;  // the order of sums must not depend on them
-  options.logging_type = ceres::SILENT;
   ceres::Solver::Summary report;
-  ceres::Solve(options, &problem, &report);
+  ceres::Solve(SolverOptions(options_), &problem, &report);
   WindowSummary summary;
   summary.iterations = static_cast<int>(report.iterations.size());
   summary.cost = report.final_cost;
@@ -446,25 +471,7 @@ void Window::Marginalize(std::span<const int> leaving, std::span<const int> moti
   std::map<std::int64_t, Landmark> hosted;
   for (const auto& [id, landmark] : landmarks)
     if (leaves(landmark.host)) hosted.emplace(id, landmark);
-  if (!hosted.empty()) {
-    std::vector<LandmarkItem> items = ItemsOf(at, hosted);
-    const VisualEquations equations(rig_, options_, threads_);
-    std::vector<BlockId> blocks;
-    for (const Frame& frame : frames) blocks.push_back({frame.id, false});
-    const SquareRoot rows = RowsOf(VisualCost(equations, at, items), blocks, at);
-    // Frames that see none of the landmarks stay out of the prior.
-    std::vector<BlockId> touched;
-    MatrixXd S(rows.S.rows(), 0);
-    for (size_t k = 0; k < blocks.size(); ++k) {
-      const auto columns =
-          rows.S.middleCols<kPoseParameters>(kPoseParameters * static_cast<Index>(k));
-      if (columns.squaredNorm() == 0) continue;
-      touched.push_back(blocks[k]);
-      S.conservativeResize(Eigen::NoChange, S.cols() + kPoseParameters);
-      S.rightCols<kPoseParameters>() = columns;
-    }
-    prior_.Add(touched, S, rows.e);
-  }
+  AddLandmarks(VisualEquations(rig_, options_, threads_), at, hosted, prior_);
   for (const InertialCost& cost : InertialCosts(at, options_.gravity)) {
     const auto blocks = cost.blocks();
     if (!slows(blocks[0].frame) && !slows(blocks[2].frame)) continue;
