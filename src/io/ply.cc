@@ -21,7 +21,12 @@ constexpr std::string_view kPoint =
     "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int support\n"
     "end_header\n";
 constexpr size_t kPointBytes = 4 * 4 + 3 + 4;
-constexpr int kCountDigits = 10;  // room for a number that is known in the end
+
+/// The header's line with the number of points, which is known in the end. Always as long: blanks
+/// end the comment before it.
+std::string CountLine(std::int64_t count) {
+  return fmt::format("{:>40}", fmt::format("\nelement vertex {}\n", count));
+}
 
 void AppendLittleEndian(std::string& bytes, uint32_t word) {
   for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 0xFF);
@@ -67,9 +72,9 @@ void WriteMeshPly(const std::filesystem::path& path, std::span<const cv::Point3f
 
 PointsPlyWriter::PointsPlyWriter(const std::filesystem::path& path, const std::string& comment)
     : file_(path) {
-  const std::string begin = fmt::format("{}comment {}\nelement vertex ", kFormat, comment);
+  const std::string begin = fmt::format("{}comment {}", kFormat, comment);
   count_at_ = static_cast<std::int64_t>(begin.size());
-  file_.Write(fmt::format("{}{:{}}\n{}", begin, 0, kCountDigits, kPoint));
+  file_.Write(begin + CountLine(0) + std::string(kPoint));
 }
 
 void PointsPlyWriter::Add(const PlyPoint& p) {
@@ -90,7 +95,7 @@ void PointsPlyWriter::Flush() {
 
 void PointsPlyWriter::Commit() {
   Flush();
-  file_.Overwrite(count_at_, fmt::format("{:{}}", count_, kCountDigits));
+  file_.Overwrite(count_at_, CountLine(count_));
   file_.Commit();
 }
 
@@ -105,9 +110,7 @@ std::vector<PlyPoint> ReadPointsPly(const std::filesystem::path& path) {
   const std::string data = ReadFile(path);
   std::string_view rest = data;
   const std::string_view begin = TakeUntil("element vertex ", rest, path);
-  std::string_view number = TakeUntil("\n", rest, path);
-  number.remove_prefix(std::min(number.find_first_not_of(' '), number.size()));
-  const auto count = ParseNumber<int>(number);
+  const auto count = ParseNumber<int>(TakeUntil("\n", rest, path));
   if (!begin.starts_with(kFormat) || !rest.starts_with(kPoint) || !count || *count < 0)
     throw Error(path.string(), "is no binary PLY file with x, y, z, variance, colour and support");
   rest.remove_prefix(kPoint.size());

@@ -176,6 +176,7 @@ TEST(StereoFlow, DropsRightPointsBehindTheCameras) {
   StereoRig swapped = kRig;
   swapped.T_left_right.p *= -1;
   FlowOptions options = Small();
+  options.max_backward_px = 0.2;
   EXPECT_LT(StereoFlow(swapped, options).Process(0, pair.left.grey, pair.right).stereo, 5);
 }
 
