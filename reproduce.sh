@@ -26,8 +26,8 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --sanitize      test: only the C++ unit tests, under the address and undefined-behaviour sanitizers
   --full          render the full suite of eleven sequences (15 GB at most) instead of the short one
                   of four (2 GB at most)
-  --runs N        runs of each line of the tables that repeat runs (odometry, table3); default: a few,
-                  for a quick look; rankings take 10, shares of success 25
+  --runs N        runs of each line of the tables that repeat runs (odometry, table3, table3_vio);
+                  default: a few, for a quick look; rankings take 10, shares of success 25
   --jobs N        parallel jobs; default: the number of processors
   --list          list the experiments and stop
   --clean         remove what was built and generated (not results/reference) and stop

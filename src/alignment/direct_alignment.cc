@@ -446,7 +446,6 @@ void DirectAligner::MakePyramid(const cv::Mat& grey, Pyramid& pyramid) const {
     MakeSampleChannels(greys[l], options_.image, pyramid.samples[l], options_.threads);
   for (size_t l = 0; l < pyramid.bit_planes.size(); ++l)
     MakeBitPlanes(greys[l], pyramid.bit_planes[l]);
-  if (greys[0].data == grey.data) greys[0].release();  // the caller's own
 }
 
 Pyramid DirectAligner::MakePyramid(const cv::Mat& grey) const {

@@ -74,6 +74,8 @@ void MakeBitPlanes(const cv::Mat& grey, BitPlanes& planes) {
 void GreyPyramid(const cv::Mat& grey, int levels, std::vector<cv::Mat1f>& pyramid) {
   RequireGreyImage(grey, "image");
   pyramid.resize(levels);
+  // An image that another one may be looking at, as after a call with floats, is not written to.
+  if (!pyramid[0].u || pyramid[0].u->refcount > 1) pyramid[0].release();
   if (grey.depth() == CV_32F)
     pyramid[0] = grey;
   else

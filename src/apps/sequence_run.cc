@@ -56,6 +56,13 @@ cv::Mat1b ImageLoader::operator()(const std::filesystem::path& path, std::int64_
   return image;
 }
 
+void EventFile::Write(int frame, std::int64_t time_ns, const std::string& event,
+                      const nlohmann::ordered_json& more) {
+  nlohmann::ordered_json line = {{"frame", frame}, {"time_ns", time_ns}, {"event", event}};
+  line.update(more);
+  file_.Write(line.dump() + "\n");
+}
+
 bool ReportClock::Due(size_t done, size_t total) {
   const auto now = std::chrono::steady_clock::now();
   if (done < total && now - last_ < std::chrono::seconds(2)) return false;

@@ -8,12 +8,15 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <yaml-cpp/yaml.h>
 
 #include <sgf/apps/sequence_change.h>
 #include <sgf/core/options.h>
+#include <sgf/io/atomic_file.h>
 #include <sgf/io/odometry_dataset.h>
+#include <sgf/io/ply.h>
 
 /// What the tools share that run an odometry over a sequence.
 namespace sgf::apps {
@@ -57,6 +60,35 @@ class ImageLoader {
   double clipped_ = 0;
   int images_ = 0;
 };
+
+/// A line of JSON for everything that happens in a run, written as it happens.
+class EventFile {
+ public:
+  /// @throws Error for a file that cannot be made.
+  explicit EventFile(const std::filesystem::path& file) : file_(file) {}
+
+  /// Writes frame, time_ns, event and what `more` has. @throws Error for a line that cannot be
+  /// written.
+  void Write(int frame, std::int64_t time_ns, const std::string& event,
+             const nlohmann::ordered_json& more);
+
+  /// Gives the file its name. @throws Error where that fails.
+  void Close() { file_.Commit(); }
+
+ private:
+  AtomicFile file_;
+};
+
+/// A point of a map as PLY files have it; its variance is that of the inverse depth over its
+/// square.
+/// @param point with position, inverse depth, its variance, grey and support.
+template <class Point>
+PlyPoint ToPly(const Point& point) {
+  const Eigen::Vector3f p = point.position.template cast<float>();
+  const double relative =
+      point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
+  return {{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support};
+}
 
 /// Says when to report: every two seconds, and at the end.
 class ReportClock {

@@ -128,7 +128,7 @@ class FrameSource {
   odometry::Undistorter undistorter_;
 };
 
-/// A line of JSON for everything that happens to the map, written as it happens.
+/// What happens to the map.
 class EventLog {
  public:
   explicit EventLog(const fs::path& file) : file_(file) {}
@@ -152,20 +152,17 @@ class EventLog {
   }
 
   /// @throws Error if any line could not be written.
-  void Close() { file_.Commit(); }
+  void Close() { file_.Close(); }
 
  private:
   void Write(int frame, const direct::DirectFrameResult& result, const char* event,
-             nlohmann::ordered_json more) {
-    nlohmann::ordered_json line = {{"frame", frame},
-                                   {"time_ns", result.time_ns},
-                                   {"event", event},
-                                   {"segment", result.segment}};
-    if (!more.is_null()) line.update(more);
-    file_.Write(line.dump() + "\n");
+             const nlohmann::ordered_json& more) {
+    nlohmann::ordered_json all = {{"segment", result.segment}};
+    if (!more.is_null()) all.update(more);
+    file_.Write(frame, result.time_ns, event, all);
   }
 
-  AtomicFile file_;
+  EventFile file_;
   direct::DirectState state_ = direct::DirectState::kInitialising;
   int segment_ = 0;
 };
@@ -198,13 +195,6 @@ class PointFiles {
                      "x right, y down, z forward of the first key-frame, units of the map; "
                      "variance: of the inverse depth over its square")
         .first->second;
-  }
-
-  static PlyPoint ToPly(const direct::MapPoint& point) {
-    const Eigen::Vector3f p = point.position.cast<float>();
-    const double relative =
-        point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
-    return {{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support};
   }
 
   fs::path folder_;

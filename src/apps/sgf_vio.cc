@@ -40,7 +40,7 @@ struct Arguments {
   bool real_time = false;
 };
 
-/// A line of JSON for everything that happens, written as it happens.
+/// What happens to the state.
 class EventLog {
  public:
   explicit EventLog(const fs::path& file) : file_(file) {}
@@ -62,27 +62,21 @@ class EventLog {
   }
 
   void Dropped(int frame, std::int64_t time_ns) {
-    file_.Write(
-        nlohmann::ordered_json({{"frame", frame}, {"time_ns", time_ns}, {"event", "dropped"}})
-            .dump() +
-        "\n");
+    file_.Write(frame, time_ns, "dropped", nlohmann::ordered_json::object());
   }
 
   /// @throws Error if any line could not be written.
-  void Close() { file_.Commit(); }
+  void Close() { file_.Close(); }
 
  private:
   void Write(int frame, const vio::VioFrameResult& result, const std::string& event,
-             nlohmann::ordered_json more) {
-    nlohmann::ordered_json line = {{"frame", frame},
-                                   {"time_ns", result.time_ns},
-                                   {"event", event},
-                                   {"segment", result.segment}};
-    if (!more.is_null()) line.update(more);
-    file_.Write(line.dump() + "\n");
+             const nlohmann::ordered_json& more) {
+    nlohmann::ordered_json all = {{"segment", result.segment}};
+    if (!more.is_null()) all.update(more);
+    file_.Write(frame, result.time_ns, event, all);
   }
 
-  AtomicFile file_;
+  EventFile file_;
   std::optional<vio::VioState> state_;
   vio::InitialisationProblem problem_ = vio::InitialisationProblem::kNone;
   bool inertial_ = false;
@@ -96,12 +90,7 @@ class PointFile {
             "z up, world of trajectory.txt, m; variance: of the inverse depth over its square") {}
 
   void Add(const std::vector<vio::VioPoint>& points) {
-    for (const vio::VioPoint& point : points) {
-      const Eigen::Vector3f p = point.position.cast<float>();
-      const double relative =
-          point.inverse_depth_variance / (point.inverse_depth * point.inverse_depth);
-      writer_.Add({{p.x(), p.y(), p.z()}, point.grey, static_cast<float>(relative), point.support});
-    }
+    for (const vio::VioPoint& point : points) writer_.Add(ToPly(point));
   }
 
   /// @return the number of points.

@@ -84,4 +84,9 @@ struct SE3 {
   }
 };
 
+/// So much of a motion, at constant velocity. @param share may be negative or above 1.
+inline SE3 PartOf(const SE3& motion, double share) {
+  return {ExpSO3(share * LogSO3(motion.R)), share * motion.p};
+}
+
 }  // namespace sgf

@@ -7,6 +7,7 @@
 
 #include <sgf/alignment/warp.h>
 #include <sgf/core/error.h>
+#include <sgf/core/keyframe_choice.h>
 #include <sgf/core/parallel.h>
 #include <sgf/core/stopwatch.h>
 #include <sgf/direct/direct_odometry.h>
@@ -69,15 +70,10 @@ class Occupancy {
   cv::Mat1b cells_;
 };
 
-/// So much of a motion, at constant velocity.
-SE3 Part(const SE3& motion, double share) {
-  return {ExpSO3(share * LogSO3(motion.R)), share * motion.p};
-}
-
 /// Motions that may have happened since the last frame, T_cur_last, the likeliest first.
 std::vector<SE3> Hypotheses(const SE3& motion) {
   const SE3 none;
-  std::vector<SE3> motions = {motion, none, Part(motion, 0.5), motion * motion};
+  std::vector<SE3> motions = {motion, none, PartOf(motion, 0.5), motion * motion};
   // Turns about all axes and their diagonals, on top of the motion.
   for (const double angle : {0.02, 0.05})  // rad
     for (int x = -1; x <= 1; ++x)
@@ -389,7 +385,7 @@ class DirectOdometry::Impl {
       const Record& before = records_[records_.size() - 2];
       const double share = static_cast<double>(result.time_ns - last.time_ns) /
                            static_cast<double>(last.time_ns - before.time_ns);
-      motion = Part(PoseOf(last) * PoseOf(before).Inverse(), share);
+      motion = PartOf(PoseOf(last) * PoseOf(before).Inverse(), share);
     }
     alignment::AlignmentResult best;
     best.failure = alignment::AlignmentFailure::kFewPoints;
@@ -660,21 +656,10 @@ class DirectOdometry::Impl {
       }
     }
     if (left <= options_.keyframes) return leaving;
-    const auto distance = [&](int a, int b) {
-      return (window_[a]->T_cam_world.Inverse().p - window_[b]->T_cam_world.Inverse().p).norm();
-    };
-    int farthest = 0;
-    double highest = -1;
-    for (int k = 0; k < newest - 1; ++k) {
-      double near = 0;
-      for (int j = 0; j < newest - 1; ++j)
-        if (j != k) near += 1 / (distance(k, j) + 1e-5);
-      const double score = std::sqrt(distance(k, newest)) * near;
-      if (score > highest) {
-        highest = score;
-        farthest = k;
-      }
-    }
+    std::vector<Vector3d> places;
+    for (int k = 0; k < newest - 1; ++k) places.push_back(window_[k]->T_cam_world.Inverse().p);
+    const int farthest =
+        static_cast<int>(LeastUsefulKeyframe(places, window_[newest]->T_cam_world.Inverse().p));
     if (std::find(leaving.begin(), leaving.end(), farthest) == leaving.end())
       leaving.push_back(farthest);
     return leaving;

@@ -144,8 +144,8 @@ class DirectOdometry {
   /// @param grey 8-bit, or float as PhotometricCorrection gives it; of the camera's size.
   /// @param exposure_ms where it is known; then for all frames.
   /// @throws Error for another type or size, grey levels that are not finite, a time not after the
-  /// last one, an exposure that is
-  ///   not positive, or one of some frames only. The state is as before the call.
+  ///   last one, an exposure that is not positive, or one of some frames only. The state is as
+  ///   before the call.
   DirectFrameResult Process(std::int64_t time_ns, const cv::Mat& grey,
                             std::optional<double> exposure_ms = std::nullopt);
 

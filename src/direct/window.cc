@@ -33,12 +33,10 @@ struct Reduced {
 /// delta_rel = delta_cur - Ad(T_cur_ref) delta_ref for left perturbations of both poses.
 Matrix6d Adjoint(const SE3& T) {
   const Eigen::Matrix3d R = T.R.toRotationMatrix();
-  Eigen::Matrix3d cross;
-  cross << 0, -T.p.z(), T.p.y(), T.p.z(), 0, -T.p.x(), -T.p.y(), T.p.x(), 0;
   Matrix6d adjoint = Matrix6d::Zero();
   adjoint.topLeftCorner<3, 3>() = R;
   adjoint.bottomRightCorner<3, 3>() = R;
-  adjoint.topRightCorner<3, 3>() = cross * R;
+  adjoint.topRightCorner<3, 3>() = HatSO3(T.p) * R;
   return adjoint;
 }
 

@@ -35,7 +35,7 @@ std::span<const std::pair<const char*, InitialisationProblem>> EnumNames(Initial
 const char* Explain(InitialisationProblem problem);
 
 struct InertialInitializerOptions {
-  double gravity = 9.81;
+  double gravity = 9.81;  ///< m/s^2; the odometry's is set with its window's options
   double min_rest_s = 0.5;
   double rest_gyro_sd = 0.03;
   double rest_accel_sd = 0.3;
@@ -49,7 +49,6 @@ struct InertialInitializerOptions {
 
   template <class V>
   void VisitFields(V&& visit) {
-    visit("gravity", gravity, "m/s^2", "magnitude of gravity");
     visit("min_rest_s", min_rest_s, "s", "shortest rest to begin from");
     visit("rest_gyro_sd", rest_gyro_sd, "rad/s",
           "standard deviation of the angular rate about an axis up to which the body is at rest");

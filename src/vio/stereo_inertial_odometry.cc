@@ -5,7 +5,9 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/keyframe_choice.h>
 #include <sgf/core/stopwatch.h>
+#include <sgf/vio/inertial_start.h>
 #include <sgf/vio/stereo_inertial_odometry.h>
 #include <sgf/vio/triangulation.h>
 
@@ -13,11 +15,6 @@ namespace sgf::vio {
 namespace {
 
 using Eigen::Vector2d, Eigen::Vector3d;
-
-/// So much of a motion, at constant velocity.
-SE3 Part(const SE3& motion, double share) {
-  return {ExpSO3(share * LogSO3(motion.R)), share * motion.p};
-}
 
 ImuBias BiasOf(const BodyState& state) { return {state.gyro_bias, state.accel_bias}; }
 
@@ -47,10 +44,11 @@ class StereoInertialOdometry::Impl {
   Impl(const flow::StereoRig& rig, const SE3& T_body_left, const ImuNoise& noise,
        const VioOptions& options)
       : cameras_(rig),
-        options_(WithThreads(options)),
+        options_(Resolved(options)),
         flow_(rig, options_.flow),
         imu_(noise, options.imu),
-        window_(RigOf(rig, T_body_left), options.window, options.threads) {
+        window_(RigOf(rig, T_body_left), options.window, options.threads),
+        start_(options_.start, options.start_s, static_cast<size_t>(options.states)) {
     CheckOptions(options);
   }
 
@@ -86,7 +84,7 @@ class StereoInertialOdometry::Impl {
       if (options_.inertial && !inertial_) Start(result);
       Marginalize();
     }
-    imu_.DropBefore(start_.empty() ? time_ns : start_.front().time_ns);
+    imu_.DropBefore(start_.first_ns().value_or(time_ns));
     result.inertial = inertial_;
     result.times.marginalization_s = stage.Lap();
     result.times.total_s = total.Lap();
@@ -104,8 +102,10 @@ class StereoInertialOdometry::Impl {
   }
 
  private:
-  static VioOptions WithThreads(VioOptions options) {
+  /// What is one number for all is stated once.
+  static VioOptions Resolved(VioOptions options) {
     options.flow.threads = options.threads;
+    options.start.gravity = options.window.gravity;
     return options;
   }
 
@@ -135,7 +135,7 @@ class StereoInertialOdometry::Impl {
       const double share = static_cast<double>(time_ns - last->state.time_ns) /
                            static_cast<double>(last->state.time_ns - before.time_ns);
       const SE3 motion = before.T_world_body.Inverse() * last->state.T_world_body;
-      frame.state.T_world_body = last->state.T_world_body * Part(motion, share);
+      frame.state.T_world_body = last->state.T_world_body * PartOf(motion, share);
     }
     if (frame.since_last)
       frame.state.T_world_body.R = last->state.T_world_body.R * frame.since_last->delta_R();
@@ -181,47 +181,17 @@ class StereoInertialOdometry::Impl {
               .normalized();
     }
     frame.keyframe = true;
-    start_.clear();
+    start_.Clear();
     window_.AnchorPose(frame, Eigen::Matrix<double, kPoseParameters, 1>::Constant(kHeld));
   }
 
   /// Lets the inertial sensor take part as soon as it can be told where down is.
   void Start(VioFrameResult& result) {
-    start_.push_back({result.time_ns, window_.frames.back().state.T_world_body});
-    // Poses from before the sensor's first sample, or from before a gap, say nothing of it.
-    while (start_.size() > 1 && !imu_.Covers(start_.front().time_ns, result.time_ns))
-      start_.erase(start_.begin());
-    if (!imu_.Covers(start_.front().time_ns, result.time_ns))
-      result.problem = InitialisationProblem::kTooLittleData;
-    const double span_s = 1e-9 * static_cast<double>(result.time_ns - start_.front().time_ns);
-    const auto states = static_cast<size_t>(options_.states);
-    if (span_s < options_.start_s || window_.frames.size() < states) return;
-    InertialInitialisation found =
-        IsAtRest() ? StartAtRest(result.time_ns) : InitializeMoving(start_, imu_, options_.start);
-    result.problem = found.problem;
-    constexpr double kLongest = 5;  // times the span: what came first is not needed for ever
-    if (!found.ok() && span_s > kLongest * options_.start_s) start_.erase(start_.begin());
-    if (found.ok()) TakeOver(found);
-  }
-
-  /// As the images have it: the inertial sensor cannot tell rest from constant velocity.
-  bool IsAtRest() const {
-    constexpr double kLeastMotion_m = 0.02, kLeastTurn_rad = 0.01;
-    return std::all_of(start_.begin(), start_.end(), [&](const TimedPose& pose) {
-      const SE3 motion = start_.front().pose.Inverse() * pose.pose;
-      return motion.p.norm() < kLeastMotion_m && LogSO3(motion.R).norm() < kLeastTurn_rad;
-    });
-  }
-
-  InertialInitialisation StartAtRest(std::int64_t time_ns) const {
-    InertialInitialisation found =
-        InitializeAtRest(imu_, start_.front().time_ns, time_ns, options_.start);
-    if (!found.ok()) return found;
-    const Vector3d up_body = found.states.back().T_world_body.R.conjugate() * Vector3d::UnitZ();
-    found.T_world_visual.R =
-        Eigen::Quaterniond::FromTwoVectors(start_.back().pose.R * up_body, Vector3d::UnitZ());
-    found.states.assign(start_.size(), BodyState(found.states.back()));  // the same all the time
-    return found;
+    const auto found = start_.Add({result.time_ns, window_.frames.back().state.T_world_body}, imu_);
+    if (!found) return;
+    result.problem = found->problem;
+    if (found->ok() && window_.frames.size() >= static_cast<size_t>(options_.states))
+      TakeOver(*found);
   }
 
   void TakeOver(const InertialInitialisation& found) {
@@ -250,7 +220,7 @@ class StereoInertialOdometry::Impl {
     motion << Vector3d::Constant(kVelocitySigma), found.gyro_bias_sd, found.accel_bias_sd;
     window_.AnchorMotion(window_.frames[first], motion);
     inertial_ = true;
-    start_.clear();
+    start_.Clear();
     R_gravity_world_ = found.T_world_visual.R * R_gravity_world_;
     last_ = window_.frames.back().state;
   }
@@ -418,7 +388,7 @@ class StereoInertialOdometry::Impl {
   void Forget() {
     window_ = Window(window_.rig(), options_.window, options_.threads);
     tracks_.clear();
-    start_.clear();
+    start_.Clear();
     inertial_ = false;
     since_keyframe_ = 0;
   }
@@ -467,21 +437,9 @@ class StereoInertialOdometry::Impl {
       const auto [now, all] = seen[keyframes[k]->id];
       if (now <= kHardly * all) return keyframes[k]->id;
     }
-    const auto place = [](const Frame& frame) { return frame.state.T_world_body.p; };
-    int least = keyframes[0]->id;
-    double highest = -1;
-    for (size_t k = 0; k < old; ++k) {
-      double near = 0;
-      for (size_t j = 0; j < old; ++j)
-        if (j != k) near += 1 / ((place(*keyframes[k]) - place(*keyframes[j])).norm() + 1e-5);
-      const double far = (place(*keyframes[k]) - place(*Newest())).norm();
-      const double score = std::sqrt(far) * near;
-      if (score > highest) {
-        highest = score;
-        least = keyframes[k]->id;
-      }
-    }
-    return least;
+    std::vector<Vector3d> places;
+    for (size_t k = 0; k < old; ++k) places.push_back(keyframes[k]->state.T_world_body.p);
+    return keyframes[LeastUsefulKeyframe(places, Newest()->state.T_world_body.p)]->id;
   }
 
   /// In the window's world.
@@ -509,8 +467,8 @@ class StereoInertialOdometry::Impl {
   static constexpr double kHeld = 1e-4;  ///< rad, m: standard deviation of what is held
   BodyState last_;
   Eigen::Quaterniond R_gravity_world_ = Eigen::Quaterniond::Identity();
-  bool inertial_ = false;         ///< the inertial sensor takes part
-  std::vector<TimedPose> start_;  ///< poses of images alone before that
+  bool inertial_ = false;  ///< the inertial sensor takes part
+  InertialStart start_;
   int next_id_ = 0;
   int since_keyframe_ = 0;
   int segment_ = 0;

@@ -14,12 +14,6 @@ using Matrix26 = Eigen::Matrix<double, 2, kPoseParameters>;
 
 constexpr int kBatch = 16;  // landmarks whose sums are taken together, in order
 
-Matrix3d Cross(const Vector3d& v) {
-  Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 }  // namespace
 
 /// A sight of a landmark with its derivatives, in deviations.
@@ -73,10 +67,10 @@ bool VisualEquations::See(std::span<const PoseState> poses, const LandmarkItem& 
       by_P * (T_cb.R * T_t.R.conjugate()).toRotationMatrix();
   const Matrix3d R_h = T_h.R.toRotationMatrix();
   const Eigen::Matrix<double, 2, 3> to_host = to_world * R_h;
-  seen.by_host.leftCols<3>() = -to_host * Cross(b) * host.turn;
+  seen.by_host.leftCols<3>() = -to_host * HatSO3(b) * host.turn;
   seen.by_host.rightCols<3>() = rho * to_world;
   const Vector3d m = T_t.R.conjugate() * (T_h.R * b + rho * (T_h.p - T_t.p));
-  seen.by_target.leftCols<3>() = by_P * T_cb.R.toRotationMatrix() * Cross(m) * target.turn;
+  seen.by_target.leftCols<3>() = by_P * T_cb.R.toRotationMatrix() * HatSO3(m) * target.turn;
   seen.by_target.rightCols<3>() = -rho * to_world;
   seen.by_landmark.leftCols<2>() = to_host * T_bc.R.toRotationMatrix().leftCols<2>();
   seen.by_landmark.col(2) = to_host * T_bc.p + to_world * (T_h.p - T_t.p) + by_P * T_cb.p;

@@ -9,7 +9,6 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -23,6 +22,8 @@
 #include <sgf/flow/stereo_flow.h>
 #include <sgf/io/image.h>
 #include <sgf/io/odometry_dataset.h>
+
+#include "bench/bench_main.h"
 
 namespace sgf {
 namespace {
@@ -157,20 +158,10 @@ int Run(int argc, char** argv) {
   for (const std::string& isa : targets)
     if (isa != targets.front() && isa != "scalar")
       for (const char* residual : {"lssd", "sgf3", "ngv"}) RegisterFlow(images, residual, isa, 1);
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return RunRegistered(argc, argv);
 }
 
 }  // namespace
 }  // namespace sgf
 
-int main(int argc, char** argv) {
-  try {
-    return sgf::Run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "flow_bench: " << error.what() << '\n';
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return sgf::BenchmarkMain(argc, argv, sgf::Run); }

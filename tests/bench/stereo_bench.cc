@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -25,6 +24,8 @@
 #include <sgf/core/simd.h>
 #include <sgf/io/image.h>
 #include <sgf/stereo/stereo_sgf.h>
+
+#include "bench/bench_main.h"
 
 namespace sgf {
 namespace {
@@ -163,20 +164,10 @@ int Run(int argc, char** argv) {
   const std::vector<Case> cases{MakeCase(left, right, left.size(), 128),
                                 MakeCase(left, right, left.size() * 2, 256)};
   for (const Case& c : cases) RegisterCase(c);
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 2;
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
+  return RunRegistered(argc, argv);
 }
 
 }  // namespace
 }  // namespace sgf
 
-int main(int argc, char** argv) {
-  try {
-    return sgf::Run(argc, argv);
-  } catch (const std::exception& error) {
-    std::cerr << "stereo_bench: " << error.what() << '\n';
-    return 2;
-  }
-}
+int main(int argc, char** argv) { return sgf::BenchmarkMain(argc, argv, sgf::Run); }

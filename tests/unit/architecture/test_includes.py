@@ -64,4 +64,4 @@ def test_only_the_places_meant_for_them_use_mrpt_and_ceres():
         for path in SOURCES
         for library in re.findall(r"#\s*include\s*<(mrpt|ceres)/", path.read_text())
     }
-    assert users <= {("direct", "ceres"), ("vio", "ceres")}
+    assert users == {("direct", "ceres"), ("vio", "ceres")}

@@ -30,7 +30,7 @@ struct Scene {
       landmark.ray = {0.8 * Uniform01(1, 2 * k) - 0.4, 0.8 * Uniform01(1, 2 * k + 1) - 0.4};
       landmark.inverse_depth = 0.05 + Uniform01(2, k);
       for (int target = 0; target < kPoses; ++target)
-        for (const int camera : {0, 1}) landmark.sights.push_back({target, camera, {}});
+        for (const int camera : {0, 1}) landmark.sights.push_back({.frame = target, .camera = camera});
     }
     for (int k = 0; k < count; ++k) items.push_back(ItemOf(landmarks[k]));
     for (int k = 0; k < count; ++k)

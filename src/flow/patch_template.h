@@ -1,0 +1,168 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <tuple>
+#include <type_traits>
+
+#include <Eigen/Core>
+
+#include <sgf/alignment/residual.h>
+#include <sgf/alignment/residual_table.h>
+#include <sgf/core/always_inline.h>
+#include <sgf/flow/patch_tracker.h>
+
+/// What a patch tracker computes with: patches pixel by pixel, a row of numbers for each channel.
+namespace sgf::flow::internal {
+
+/// Sums are taken in as many parts on every instruction set.
+inline constexpr int kLanes = 8;
+
+/// A number for each pixel of a patch.
+struct PixelRow {
+  std::array<float, alignment::kMaxPatternPixels> v;
+  float& operator[](int k) { return v[static_cast<size_t>(k)]; }
+  const float& operator[](int k) const { return v[static_cast<size_t>(k)]; }
+};
+
+/// A pattern, filled up to a multiple of kLanes by pixels that do not count.
+struct PaddedPattern {
+  PixelRow x{}, y{};  ///< offsets, px
+  PixelRow mask{};    ///< 1 for the pattern's pixels, 0 for others
+  int size = 0, padded = 0;
+  float radius = 0;  ///< px
+
+  explicit PaddedPattern(alignment::Pattern pattern) {
+    for (const Eigen::Vector2f& offset : alignment::Offsets(pattern)) {
+      x[size] = offset.x();
+      y[size] = offset.y();
+      mask[size++] = 1;
+      radius = std::max(radius, offset.norm());
+    }
+    padded = (size + kLanes - 1) / kLanes * kLanes;
+  }
+};
+
+/// Dissimilarities that patches can be followed by. Magnitudes (sad, agm, pm) have no curvature and
+/// ngf no minimum at equality.
+using TrackableMetrics =
+    std::tuple<metrics::Photo, metrics::Gm, metrics::Gn, metrics::Ugf, metrics::Sgf, metrics::Sgf2,
+               metrics::Sgf3, metrics::Ngv, metrics::Sgv, metrics::Sgf3Vec>;
+
+template <class Residual, class... Metrics>
+constexpr bool IsOf(std::tuple<Metrics...>*) {
+  return (std::is_same_v<Residual, alignment::PointResidual<Metrics>> || ...);
+}
+
+template <class Residual>
+inline constexpr bool kTrackable = std::is_same_v<Residual, alignment::LssdResidual> ||
+                                   IsOf<Residual>(static_cast<TrackableMetrics*>(nullptr));
+
+/// Whether a residual looks at intensities alone, so that no gradients have to be made.
+template <class Residual>
+inline constexpr bool kIntensityAlone =
+    !alignment::kPointwise<Residual> ||
+    std::is_same_v<Residual, alignment::PointResidual<metrics::Photo>>;
+
+/// Channels of a level: intensity alone, or all of SampleChannels.
+template <class Residual>
+inline constexpr int kChannelsOf =
+    kIntensityAlone<Residual> ? 1 : alignment::SampleChannels::kChannels;
+
+/// A level of a pyramid, interleaved channels.
+struct LevelView {
+  const float* pixels;
+  int cols, rows;
+  int channels;
+  size_t stride;  ///< floats from row to row
+
+  bool Has(const Eigen::Vector2f& p, float margin) const {
+    return p.x() >= margin && p.y() >= margin && p.x() <= float(cols - 1) - margin &&
+           p.y() <= float(rows - 1) - margin;
+  }
+};
+
+template <class Residual>
+LevelView ViewOf(const Pyramid& pyramid, int level) {
+  if constexpr (kIntensityAlone<Residual>) {
+    const cv::Mat1f& grey = pyramid.grey[static_cast<size_t>(level)];
+    return {grey[0], grey.cols, grey.rows, 1, grey.step1()};
+  } else {
+    const auto& samples = pyramid.samples[static_cast<size_t>(level)];
+    constexpr int kChannels = alignment::SampleChannels::kChannels;
+    return {samples.At(0, 0), samples.cols(), samples.rows(), kChannels,
+            size_t(samples.cols()) * kChannels};
+  }
+}
+
+/// Channels at the pixels of a patch.
+template <int N>
+struct PatchValues {
+  std::array<PixelRow, N> value;
+
+  SGF_ALWAYS_INLINE Eigen::Array4f At(int k) const {
+    Eigen::Array4f channels = Eigen::Array4f::Zero();
+    for (int c = 0; c < N; ++c) channels[c] = value[size_t(c)][k];
+    return channels;
+  }
+};
+
+/// And their derivatives by the place.
+template <int N>
+struct PatchSlopes : PatchValues<N> {
+  std::array<PixelRow, N> d_x, d_y;
+
+  SGF_ALWAYS_INLINE alignment::ChannelsAt<float, 4> WithSlopes(int k) const {
+    alignment::ChannelsAt<float, 4> at{this->At(k), Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
+    for (int c = 0; c < N; ++c) {
+      at.d_x[c] = d_x[size_t(c)][k];
+      at.d_y[c] = d_y[size_t(c)][k];
+    }
+    return at;
+  }
+};
+
+/// Samples of the reference's pixels: as many of their members as the residual looks at.
+template <bool kIntensity>
+struct PatchReference {
+  std::array<PixelRow, kIntensity ? 1 : 8> member;
+
+  SGF_ALWAYS_INLINE metrics::Sample<float> At(int k) const {
+    if constexpr (kIntensity)
+      return {member[0][k], 0, 0, 0, 0, 0, 0, 0};
+    else
+      return {member[0][k], member[1][k], member[2][k], member[3][k],
+              member[4][k], member[5][k], member[6][k], member[7][k]};
+  }
+  SGF_ALWAYS_INLINE void Set(int k, const metrics::Sample<float>& s) {
+    member[0][k] = s.intensity;
+    if constexpr (!kIntensity) {
+      const float others[] = {s.gx, s.gy, s.norm, s.reg_norm, s.ax, s.ay, s.r};
+      for (size_t m = 0; m < 7; ++m) member[m + 1][k] = others[m];
+    }
+  }
+};
+
+/// A patch at one level.
+template <class Residual>
+struct LevelTemplate {
+  static constexpr bool kInverse = Residual::kInverseCompositional;
+  bool usable;
+  float divisor;  ///< of lssd
+  PatchReference<kIntensityAlone<Residual>> reference;
+  /// How the channels change with the place, for residuals that are linearised at the current
+  /// image: at the minimum it shows the same, and five patches would have to be sampled there.
+  std::array<std::array<PixelRow, kInverse ? 0 : kChannelsOf<Residual>>, 2> slopes;
+  /// H^-1 J^T, whose product with the residuals is the step.
+  std::array<std::array<PixelRow, kInverse ? PatchWarp::kParameters : 0>, Residual::kDim> gain;
+};
+
+template <class Residual>
+struct TemplateOf : PatchTemplate {
+  explicit TemplateOf(int levels)
+      : level(std::make_unique_for_overwrite<LevelTemplate<Residual>[]>(size_t(levels))) {}
+  std::unique_ptr<LevelTemplate<Residual>[]> level;
+};
+
+}  // namespace sgf::flow::internal
