@@ -16,28 +16,42 @@ internal::GreyRows RowsAround(const cv::Mat1f& image, int y) {
   return {image[std::max(y - 1, 0)], image[y], image[std::min(y + 1, image.rows - 1)], image.cols};
 }
 
+cv::Mat1f OneEpsilon(double sum, const cv::Mat1f& image, const LevelOptions& options) {
+  const double mean = sum / static_cast<double>(image.total());
+  return cv::Mat1f(1, 1, static_cast<float>(mean + options.epsilon.noise_floor));
+}
+
 /// The paper's epsilon (eq. 6) of a whole image, rows added up in order.
-float ImageEpsilon(const cv::Mat1f& image, const LevelOptions& options, int threads) {
+cv::Mat1f ImageEpsilon(const cv::Mat1f& image, const LevelOptions& options, int threads) {
   std::vector<double> sums(image.rows);
   ParallelForBatches(image.rows, threads, [&](int y) {
     sums[y] = internal::SumSquaredGradient(RowsAround(image, y), options.gradient);
   });
-  const double sum = std::accumulate(sums.begin(), sums.end(), 0.);
-  return static_cast<float>(sum / static_cast<double>(image.total()) + options.epsilon.noise_floor);
+  return OneEpsilon(std::accumulate(sums.begin(), sums.end(), 0.), image, options);
+}
+
+bool OfWholeImage(const LevelOptions& options) {
+  return options.epsilon.scope == metrics::EpsilonScope::kImage;
+}
+
+cv::Mat1f PixelEpsilon(const cv::Mat1f& image, const LevelOptions& options) {
+  return metrics::ComputeEpsilon(ComputeGradient(image, options.gradient), options.epsilon);
+}
+
+/// @throws Error for an image that cannot be worked on.
+cv::Mat1f ToFloat(const cv::Mat& grey, const LevelOptions& options) {
+  RequireGreyImage(grey, "image");
+  metrics::CheckOptions(options.epsilon);
+  return grey;  // converts where it is not float
 }
 
 }  // namespace
 
 void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples,
                         int threads) {
-  RequireGreyImage(grey, "image");
-  metrics::CheckOptions(options.epsilon);
-  const cv::Mat1f image = grey;  // converts where it is not float
-  cv::Mat1f epsilon;             // of each pixel, or one for all
-  if (options.epsilon.scope == metrics::EpsilonScope::kImage)
-    epsilon = cv::Mat1f(1, 1, ImageEpsilon(image, options, threads));
-  else
-    epsilon = metrics::ComputeEpsilon(ComputeGradient(image, options.gradient), options.epsilon);
+  const cv::Mat1f image = ToFloat(grey, options);
+  const cv::Mat1f epsilon =
+      OfWholeImage(options) ? ImageEpsilon(image, options, threads) : PixelEpsilon(image, options);
   samples.Create(image.rows, image.cols);
   ParallelForBatches(image.rows, threads, [&](int y) {
     internal::MakeSampleRow(RowsAround(image, y), options.gradient,
@@ -50,6 +64,16 @@ SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& optio
   SampleChannels samples;
   MakeSampleChannels(grey, options, samples);
   return samples;
+}
+
+cv::Mat1f MakeGradientChannels(const cv::Mat& grey, const LevelOptions& options,
+                               GradientChannels& gradients) {
+  const cv::Mat1f image = ToFloat(grey, options);
+  gradients.Create(image.rows, image.cols);
+  double sum = 0;
+  for (int y = 0; y < image.rows; ++y)
+    sum += internal::MakeGradientRow(RowsAround(image, y), options.gradient, gradients.Row(y));
+  return OfWholeImage(options) ? OneEpsilon(sum, image, options) : PixelEpsilon(image, options);
 }
 
 void MakeBitPlanes(const cv::Mat& grey, BitPlanes& planes) {

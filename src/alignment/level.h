@@ -106,6 +106,9 @@ enum SampleChannel { kIntensity, kGradientX, kGradientY, kEpsilon };
 /// all pointwise dissimilarities are made.
 using SampleChannels = ChannelImage<4>;
 
+/// The gradient alone (grey levels/px): along the columns, then along the rows.
+using GradientChannels = ChannelImage<2>;
+
 /// Eight smoothed binary images: bit k of the 3 x 3 census (Alismail, Kilgour, Browning, Lucey,
 /// "Direct visual odometry using bit-planes", 2016).
 using BitPlanes = ChannelImage<8>;
@@ -131,6 +134,14 @@ SampleChannels MakeSampleChannels(const cv::Mat& grey, const LevelOptions& optio
 /// @param threads 0 for all cores. The result does not depend on it.
 void MakeSampleChannels(const cv::Mat& grey, const LevelOptions& options, SampleChannels& samples,
                         int threads = 1);
+
+/// Gradients of a grey image; memory of the right size is used again.
+/// @return epsilon, (grey levels/px)^2: of all pixels in a 1 x 1 image where its scope is the
+/// image,
+///   else of each.
+/// @throws Error for an image that cannot be worked on.
+cv::Mat1f MakeGradientChannels(const cv::Mat& grey, const LevelOptions& options,
+                               GradientChannels& gradients);
 
 /// Bit-planes of a grey image, smoothed before and after binarisation (standard deviations 0.75 and
 /// 1.5 px, the values that Alismail et al. recommend for odometry).

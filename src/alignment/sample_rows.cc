@@ -81,24 +81,55 @@ class RowGradient {
 // Sums run in as many lanes on every instruction set.
 constexpr int kSums = 16;
 
+// Squared magnitudes of a row's gradients, and their sum.
+class RowSquares {
+ public:
+  explicit RowSquares(int width) {
+    static thread_local std::vector<float> memory;
+    memory.resize((size_t(width) + kSums - 1) / kSums * kSums);
+    std::fill(memory.begin() + width, memory.end(), 0.f);
+    squares_ = memory;
+  }
+
+  template <class D, class V = hn::Vec<D>>
+  HWY_INLINE void Set(D d, int x, V gx, V gy) {
+    hn::StoreU(hn::Add(hn::Mul(gx, gx), hn::Mul(gy, gy)), d, squares_.data() + x);
+  }
+
+  double Sum() const {
+    const hn::CappedTag<float, kSums> d;
+    const size_t lanes = hn::Lanes(d);
+    float sums[kSums] = {};
+    for (size_t x = 0; x < squares_.size(); x += kSums)
+      for (size_t k = 0; k < kSums; k += lanes)
+        hn::StoreU(hn::Add(hn::LoadU(d, sums + k), hn::LoadU(d, squares_.data() + x + k)), d,
+                   sums + k);
+    double sum = 0;
+    for (const float part : sums) sum += part;
+    return sum;
+  }
+
+ private:
+  std::span<float> squares_;
+};
+
 double SumSquared(const GreyRows& rows, const GradientTaps& taps) {
   const RowGradient gradient(rows, taps);
-  static thread_local std::vector<float> squares;
-  squares.assign((size_t(rows.width) + kSums - 1) / kSums * kSums, 0);
+  RowSquares squares(rows.width);
+  OverRow(rows.width,
+          [&](auto d, int x) { squares.Set(d, x, gradient.X(d, x), gradient.Y(d, x)); });
+  return squares.Sum();
+}
+
+double GradientRow(const GreyRows& rows, const GradientTaps& taps, float* out) {
+  const RowGradient gradient(rows, taps);
+  RowSquares squares(rows.width);
   OverRow(rows.width, [&](auto d, int x) {
     const auto gx = gradient.X(d, x), gy = gradient.Y(d, x);
-    hn::StoreU(hn::Add(hn::Mul(gx, gx), hn::Mul(gy, gy)), d, squares.data() + x);
+    hn::StoreInterleaved2(gx, gy, d, out + size_t{2} * x);
+    squares.Set(d, x, gx, gy);
   });
-  const hn::CappedTag<float, kSums> d;
-  const size_t lanes = hn::Lanes(d);
-  float sums[kSums] = {};
-  for (size_t x = 0; x < squares.size(); x += kSums)
-    for (size_t k = 0; k < kSums; k += lanes)
-      hn::StoreU(hn::Add(hn::LoadU(d, sums + k), hn::LoadU(d, squares.data() + x + k)), d,
-                 sums + k);
-  double sum = 0;
-  for (const float part : sums) sum += part;
-  return sum;
+  return squares.Sum();
 }
 
 void SampleRow(const GreyRows& rows, const GradientTaps& taps, std::span<const float> epsilon,
@@ -120,10 +151,15 @@ HWY_AFTER_NAMESPACE();
 namespace sgf::alignment::internal {
 
 HWY_EXPORT(SumSquared);
+HWY_EXPORT(GradientRow);
 HWY_EXPORT(SampleRow);
 
 double SumSquaredGradient(const GreyRows& rows, GradientOperator op) {
   return HWY_DYNAMIC_DISPATCH(SumSquared)(rows, TapsOf(op));
+}
+
+double MakeGradientRow(const GreyRows& rows, GradientOperator op, float* out) {
+  return HWY_DYNAMIC_DISPATCH(GradientRow)(rows, TapsOf(op), out);
 }
 
 void MakeSampleRow(const GreyRows& rows, GradientOperator op, std::span<const float> epsilon,

@@ -4,8 +4,8 @@
 
 #include <sgf/core/gradient.h>
 
-/// Rows of a SampleChannels image, made by SIMD code that is chosen at run time. The same bits for
-/// every instruction set.
+/// Rows of SampleChannels and GradientChannels images, made by SIMD code that is chosen at run
+/// time. The same bits for every instruction set.
 namespace sgf::alignment::internal {
 
 /// A row of a grey image with its neighbours; at the image's border it is its own.
@@ -18,6 +18,11 @@ struct GreyRows {
 
 /// Sum over a row of the squared gradient magnitudes, (grey levels/px)^2.
 double SumSquaredGradient(const GreyRows& rows, GradientOperator op);
+
+/// Writes a row of interleaved gradients.
+/// @param out 2 * width floats.
+/// @return sum of their squared magnitudes.
+double MakeGradientRow(const GreyRows& rows, GradientOperator op, float* out);
 
 /// Writes a row of interleaved channels: intensity, gradient and epsilon.
 /// @param epsilon of each pixel, or one for all.

@@ -95,54 +95,49 @@ HWY_INLINE void SampleGrey(const LevelView& image, ptrdiff_t shift, const Places
   }
 }
 
-// From four pixels' channels to four channels' pixels.
-HWY_INLINE void Transpose(const float* pixels, int k, std::array<PixelRow, 4>& channels) {
-#if HWY_TARGET == HWY_SCALAR
-  for (int i = 0; i < 16; ++i) channels[size_t(i % 4)][k + i / 4] = pixels[i];
-#else
-  const hn::FixedTag<float, 4> d;
-  hn::Vec<decltype(d)> c0, c1, c2, c3;
-  hn::LoadInterleaved4(d, pixels, c0, c1, c2, c3);
-  hn::StoreU(c0, d, &channels[0][k]);
-  hn::StoreU(c1, d, &channels[1][k]);
-  hn::StoreU(c2, d, &channels[2][k]);
-  hn::StoreU(c3, d, &channels[3][k]);
-#endif
+// Rows of two pixels' two channels each, interpolated between the rows: a pixel's left neighbour,
+// then its right one.
+HWY_INLINE hn::Vec<Four> BetweenRows(const float* upper, size_t stride, float fy) {
+  const Four d;
+  const auto u = hn::LoadU(d, upper), l = hn::LoadU(d, upper + stride);
+  return hn::Add(u, hn::Mul(hn::Set(d, fy), hn::Sub(l, u)));
 }
 
-// Four channels: a pixel at a time, and four of them are turned. Rows first: both pixels of a row
-// lie side by side.
-HWY_INLINE void SampleFour(const LevelView& image, ptrdiff_t shift, const Places& places, int n,
-                           std::array<PixelRow, 4>& out) {
-  const hn::CappedTag<float, 8> d;
-  const Four half;
-  constexpr int kPair = 8;
-  for (int k = 0; k < n; k += 4) {
-    alignas(32) float value[16], pair[kPair];
-    for (int i = 0; i < 4; ++i) {
-      const float* upper = image.pixels + shift + places.index[size_t(k + i)];
-      const auto fy = hn::Set(d, places.fy[k + i]);
-      const auto between = [&](int at) HWY_ATTR {
-        const auto u = hn::LoadU(d, upper + at);
-        return hn::Add(u, hn::Mul(fy, hn::Sub(hn::LoadU(d, upper + image.stride + at), u)));
-      };
-#if HWY_TARGET == HWY_AVX2 || HWY_TARGET == HWY_AVX3 || HWY_TARGET == HWY_AVX3_DL
-      static_cast<void>(pair);
-      const auto both = between(0);
-      const auto left = hn::LowerHalf(half, both), right = hn::UpperHalf(half, both);
-      hn::StoreU(hn::Add(left, hn::Mul(hn::Set(half, places.fx[k + i]), hn::Sub(right, left))),
-                 half, value + 4 * i);
-#else
-      for (int at = 0; at < kPair; at += int(hn::Lanes(d))) hn::StoreU(between(at), d, pair + at);
-      for (int c = 0; c < 4; c += int(hn::Lanes(half))) {
-        const auto left = hn::LoadU(half, pair + c), right = hn::LoadU(half, pair + 4 + c);
-        hn::StoreU(hn::Add(left, hn::Mul(hn::Set(half, places.fx[k + i]), hn::Sub(right, left))),
-                   half, value + 4 * i + c);
-      }
-#endif
+// Two channels, four pixels at a time. Rows first: both pixels of a row lie side by side.
+HWY_INLINE void SampleTwo(const LevelView& image, ptrdiff_t shift, const Places& places, int n,
+                          std::array<PixelRow, 2>& out) {
+#if HWY_TARGET == HWY_SCALAR
+  for (int k = 0; k < n; ++k) {
+    const float* upper = image.pixels + shift + places.index[size_t(k)];
+    const float* lower = upper + image.stride;
+    for (size_t c = 0; c < 2; ++c) {
+      const float left = upper[c] + places.fy[k] * (lower[c] - upper[c]);
+      const float right = upper[c + 2] + places.fy[k] * (lower[c + 2] - upper[c + 2]);
+      out[c][k] = left + places.fx[k] * (right - left);
     }
-    Transpose(value, k, out);
   }
+#else
+  const Four d;
+  const hn::RepartitionToWide<Four> pair;  // both channels of a pixel
+  const auto channels = [&](auto v) HWY_ATTR { return hn::BitCast(d, v); };
+  const auto pixels = [&](auto v) HWY_ATTR { return hn::BitCast(pair, v); };
+  for (int k = 0; k < n; k += 4) {
+    const auto row = [&](int i) HWY_ATTR {
+      return pixels(BetweenRows(image.pixels + shift + places.index[size_t(k + i)], image.stride,
+                                places.fy[k + i]));
+    };
+    const auto fx = hn::LoadU(d, &places.fx[k]);
+    const auto between = [&](auto a, auto b, auto f) HWY_ATTR {
+      const auto left = channels(hn::InterleaveLower(pair, a, b));
+      const auto right = channels(hn::InterleaveUpper(pair, a, b));
+      return hn::Add(left, hn::Mul(f, hn::Sub(right, left)));
+    };
+    const auto first = between(row(0), row(1), hn::InterleaveLower(d, fx, fx));
+    const auto second = between(row(2), row(3), hn::InterleaveUpper(d, fx, fx));
+    hn::StoreU(hn::ConcatEven(d, second, first), d, &out[0][k]);
+    hn::StoreU(hn::ConcatOdd(d, second, first), d, &out[1][k]);
+  }
+#endif
 }
 
 template <size_t N>
@@ -151,7 +146,7 @@ HWY_INLINE void SampleAt(const LevelView& image, ptrdiff_t shift, const Places& 
   if constexpr (N == 1)
     SampleGrey(image, shift, places, n, out);
   else
-    SampleFour(image, shift, places, n, out);
+    SampleTwo(image, shift, places, n, out);
 }
 
 template <size_t N>
@@ -169,6 +164,7 @@ void SamplePatch(const LevelView& image, const PaddedPattern& pattern, const Pat
                  PatchValues<N>& out) {
   Places places;
   Place(pattern, warp, image, places);
+  if constexpr (N == 2) out.epsilon = image.EpsilonAt(warp.centre);
   SampleAt(image, 0, places, pattern.padded, out.value);
 }
 
@@ -179,6 +175,7 @@ void SamplePatch(const LevelView& image, const PaddedPattern& pattern, const Pat
                  PatchSlopes<N>& out) {
   Places places;
   Place(pattern, warp, image, places);
+  if constexpr (N == 2) out.epsilon = image.EpsilonAt(warp.centre);
   SampleAt(image, 0, places, pattern.padded, out.value);
   Differences(image, N, places, pattern.padded, out.d_x);
   Differences(image, ptrdiff_t(image.stride), places, pattern.padded, out.d_y);

@@ -59,53 +59,74 @@ template <class Residual>
 inline constexpr bool kTrackable = std::is_same_v<Residual, alignment::LssdResidual> ||
                                    IsOf<Residual>(static_cast<TrackableMetrics*>(nullptr));
 
-/// Whether a residual looks at intensities alone, so that no gradients have to be made.
+/// Whether a residual looks at intensities, so that no gradients have to be made. All others look
+/// at gradients alone.
 template <class Residual>
-inline constexpr bool kIntensityAlone =
+inline constexpr bool kOfIntensity =
     !alignment::kPointwise<Residual> ||
     std::is_same_v<Residual, alignment::PointResidual<metrics::Photo>>;
 
-/// Channels of a level: intensity alone, or all of SampleChannels.
+/// Channels of a level: intensity, or both of the gradient.
 template <class Residual>
 inline constexpr int kChannelsOf =
-    kIntensityAlone<Residual> ? 1 : alignment::SampleChannels::kChannels;
+    kOfIntensity<Residual> ? 1 : alignment::GradientChannels::kChannels;
 
 /// A level of a pyramid, interleaved channels.
 struct LevelView {
   const float* pixels;
   int cols, rows;
   int channels;
-  size_t stride;  ///< floats from row to row
+  size_t stride;             ///< floats from row to row
+  const cv::Mat1f* epsilon;  ///< of the gradients
 
   bool Has(const Eigen::Vector2f& p, float margin) const {
     return p.x() >= margin && p.y() >= margin && p.x() <= float(cols - 1) - margin &&
            p.y() <= float(rows - 1) - margin;
   }
+
+  /// Of a patch: where it is not that of the whole image, its centre's serves for all of it.
+  float EpsilonAt(const Eigen::Vector2f& centre) const {
+    const auto index = [](float p, int size) {
+      return std::clamp(static_cast<int>(p + 0.5f), 0, size - 1);
+    };
+    return (*epsilon)(index(centre.y(), epsilon->rows), index(centre.x(), epsilon->cols));
+  }
 };
 
 template <class Residual>
 LevelView ViewOf(const Pyramid& pyramid, int level) {
-  if constexpr (kIntensityAlone<Residual>) {
+  if constexpr (kOfIntensity<Residual>) {
     const cv::Mat1f& grey = pyramid.grey[static_cast<size_t>(level)];
-    return {grey[0], grey.cols, grey.rows, 1, grey.step1()};
+    return {grey[0], grey.cols, grey.rows, 1, grey.step1(), nullptr};
   } else {
-    const auto& samples = pyramid.samples[static_cast<size_t>(level)];
-    constexpr int kChannels = alignment::SampleChannels::kChannels;
-    return {samples.At(0, 0), samples.cols(), samples.rows(), kChannels,
-            size_t(samples.cols()) * kChannels};
+    const auto& [gradients, epsilon] = pyramid.gradient[static_cast<size_t>(level)];
+    constexpr int kChannels = alignment::GradientChannels::kChannels;
+    return {gradients.At(0, 0),
+            gradients.cols(),
+            gradients.rows(),
+            kChannels,
+            size_t(gradients.cols()) * kChannels,
+            &epsilon};
   }
+}
+
+/// Channels as residuals take them, from those of a level.
+template <int N>
+SGF_ALWAYS_INLINE Eigen::Array4f AsSample(const std::array<PixelRow, N>& rows, int k,
+                                          float epsilon) {
+  if constexpr (N == 1)
+    return {rows[0][k], 0, 0, 0};
+  else
+    return {0, rows[0][k], rows[1][k], epsilon};
 }
 
 /// Channels at the pixels of a patch.
 template <int N>
 struct PatchValues {
   std::array<PixelRow, N> value;
+  float epsilon = 0;
 
-  SGF_ALWAYS_INLINE Eigen::Array4f At(int k) const {
-    Eigen::Array4f channels = Eigen::Array4f::Zero();
-    for (int c = 0; c < N; ++c) channels[c] = value[size_t(c)][k];
-    return channels;
-  }
+  SGF_ALWAYS_INLINE Eigen::Array4f At(int k) const { return AsSample<N>(value, k, epsilon); }
 };
 
 /// And their derivatives by the place.
@@ -114,32 +135,35 @@ struct PatchSlopes : PatchValues<N> {
   std::array<PixelRow, N> d_x, d_y;
 
   SGF_ALWAYS_INLINE alignment::ChannelsAt<float, 4> WithSlopes(int k) const {
-    alignment::ChannelsAt<float, 4> at{this->At(k), Eigen::Array4f::Zero(), Eigen::Array4f::Zero()};
-    for (int c = 0; c < N; ++c) {
-      at.d_x[c] = d_x[size_t(c)][k];
-      at.d_y[c] = d_y[size_t(c)][k];
-    }
-    return at;
+    // Epsilon counts as constant.
+    return {this->At(k), AsSample<N>(d_x, k, 0), AsSample<N>(d_y, k, 0)};
   }
 };
 
 /// Samples of the reference's pixels: as many of their members as the residual looks at.
 template <bool kIntensity>
 struct PatchReference {
-  std::array<PixelRow, kIntensity ? 1 : 8> member;
+  std::array<PixelRow, kIntensity ? 1 : 7> member;
 
   SGF_ALWAYS_INLINE metrics::Sample<float> At(int k) const {
     if constexpr (kIntensity)
       return {member[0][k], 0, 0, 0, 0, 0, 0, 0};
     else
-      return {member[0][k], member[1][k], member[2][k], member[3][k],
-              member[4][k], member[5][k], member[6][k], member[7][k]};
+      return {0,
+              member[0][k],
+              member[1][k],
+              member[2][k],
+              member[3][k],
+              member[4][k],
+              member[5][k],
+              member[6][k]};
   }
   SGF_ALWAYS_INLINE void Set(int k, const metrics::Sample<float>& s) {
-    member[0][k] = s.intensity;
-    if constexpr (!kIntensity) {
-      const float others[] = {s.gx, s.gy, s.norm, s.reg_norm, s.ax, s.ay, s.r};
-      for (size_t m = 0; m < 7; ++m) member[m + 1][k] = others[m];
+    if constexpr (kIntensity) {
+      member[0][k] = s.intensity;
+    } else {
+      const float members[] = {s.gx, s.gy, s.norm, s.reg_norm, s.ax, s.ay, s.r};
+      for (size_t m = 0; m < member.size(); ++m) member[m][k] = members[m];
     }
   }
 };
@@ -150,7 +174,7 @@ struct LevelTemplate {
   static constexpr bool kInverse = Residual::kInverseCompositional;
   bool usable;
   float divisor;  ///< of lssd
-  PatchReference<kIntensityAlone<Residual>> reference;
+  PatchReference<kOfIntensity<Residual>> reference;
   /// How the channels change with the place, for residuals that are linearised at the current
   /// image: at the minimum it shows the same, and five patches would have to be sampled there.
   std::array<std::array<PixelRow, kInverse ? 0 : kChannelsOf<Residual>>, 2> slopes;

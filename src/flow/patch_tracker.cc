@@ -63,7 +63,7 @@ SGF_FLATTEN inline void Evaluate(const Residual& residual, const Values& at, con
 // The samples of a reference.
 template <class Residual, class Slopes>
 SGF_FLATTEN inline void MakeReference(const Slopes& at, int n,
-                                      PatchReference<kIntensityAlone<Residual>>& reference) {
+                                      PatchReference<kOfIntensity<Residual>>& reference) {
 #pragma GCC ivdep
   for (int k = 0; k < n; ++k)
     reference.Set(k, Residual::template MakeReference<float>(at.WithSlopes(k)));
@@ -72,29 +72,25 @@ SGF_FLATTEN inline void MakeReference(const Slopes& at, int n,
 // Slopes of a reference's gradients, H, as an image turned by A shows them: A H A^T.
 template <class Reference>
 SGF_FLATTEN inline void Turn(const Reference& slopes, const Matrix2f& linear, int n,
-                             PatchSlopes<4>& at) {
-  using alignment::kGradientX, alignment::kGradientY;
+                             PatchSlopes<2>& at) {
   const float c = linear(0, 0), s = linear(1, 0);
 #pragma GCC ivdep
   for (int k = 0; k < n; ++k) {
-    const float xx = slopes[0][kGradientX][k], xy = slopes[1][kGradientX][k];
-    const float yx = slopes[0][kGradientY][k], yy = slopes[1][kGradientY][k];
+    const float xx = slopes[0][0][k], xy = slopes[1][0][k];
+    const float yx = slopes[0][1][k], yy = slopes[1][1][k];
     const float xx_a = c * xx - s * yx, xy_a = c * xy - s * yy;
     const float yx_a = s * xx + c * yx, yy_a = s * xy + c * yy;
-    at.d_x[kGradientX][k] = xx_a * c - xy_a * s;
-    at.d_y[kGradientX][k] = xx_a * s + xy_a * c;
-    at.d_x[kGradientY][k] = yx_a * c - yy_a * s;
-    at.d_y[kGradientY][k] = yx_a * s + yy_a * c;
-    at.d_x[0][k] = at.value[kGradientX][k];
-    at.d_y[0][k] = at.value[kGradientY][k];
-    at.d_x[3][k] = at.d_y[3][k] = 0;  // epsilon counts as constant
+    at.d_x[0][k] = xx_a * c - xy_a * s;
+    at.d_y[0][k] = xx_a * s + xy_a * c;
+    at.d_x[1][k] = yx_a * c - yy_a * s;
+    at.d_y[1][k] = yx_a * s + yy_a * c;
   }
 }
 
 // Residuals and their derivatives by the warp's parameters.
 template <class Residual, class Slopes>
 SGF_FLATTEN inline void Linearize(const Residual& residual, const Slopes& at, const PatchWarp& warp,
-                                  const PatchReference<kIntensityAlone<Residual>>& reference,
+                                  const PatchReference<kOfIntensity<Residual>>& reference,
                                   const PaddedPattern& pattern, Residuals<Residual>& r,
                                   Jacobians<Residual>& J) {
   const Matrix2f linear = warp.Linear();
@@ -169,10 +165,11 @@ class TrackerOf final : public PatchTracker {
 
   void MakePyramid(const cv::Mat& grey, Pyramid& pyramid) const override {
     alignment::GreyPyramid(grey, options_.levels, pyramid.grey);
-    if constexpr (!kIntensityAlone<Residual>) {
-      pyramid.samples.resize(pyramid.grey.size());
+    if constexpr (!kOfIntensity<Residual>) {
+      pyramid.gradient.resize(pyramid.grey.size());
       for (size_t level = 0; level < pyramid.grey.size(); ++level)
-        alignment::MakeSampleChannels(pyramid.grey[level], {}, pyramid.samples[level]);
+        pyramid.gradient[level].epsilon = alignment::MakeGradientChannels(
+            pyramid.grey[level], options_.image, pyramid.gradient[level].gradients);
     }
   }
 

@@ -24,13 +24,19 @@ struct TrackerOptions {
   int levels = 4;
   int max_iterations = 5;
   double tolerance_px = 0.01;
+  alignment::LevelOptions image = {};
 };
 
-/// An image as a tracker samples it: grey levels alone, or with their gradients. Finest level
-/// first.
+/// Gradients of an image, and what they are normalised by.
+struct GradientLevel {
+  alignment::GradientChannels gradients;
+  cv::Mat1f epsilon;  ///< of MakeGradientChannels()
+};
+
+/// An image as a tracker samples it, finest level first: grey levels or their gradients.
 struct Pyramid {
   std::vector<cv::Mat1f> grey;
-  std::vector<alignment::SampleChannels> samples;  ///< empty for residuals of intensities alone
+  std::vector<GradientLevel> gradient;  ///< empty for residuals of intensities
 };
 
 /// Where a patch is in another image: in pixels of the finest level.

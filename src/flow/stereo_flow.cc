@@ -109,6 +109,7 @@ void CheckOptions(const FlowOptions& o) {
   RequireRange("max_backward_px", o.max_backward_px, 0, 1e6);
   RequireRange("max_disparity_px", o.max_disparity_px, 0, 1e6);
   RequireRange("max_epipolar_error", o.max_epipolar_error, 0, 2);
+  metrics::CheckOptions(o.image.epsilon);
   ResolveThreads(o.threads);
 }
 
@@ -121,7 +122,8 @@ class StereoFlow::Impl {
                                              .pattern = options.pattern,
                                              .levels = options.levels,
                                              .max_iterations = options.max_iterations,
-                                             .tolerance_px = options.tolerance_px})),
+                                             .tolerance_px = options.tolerance_px,
+                                             .image = options.image})),
         on_epipolar_line_(rig, options.max_epipolar_error) {}
 
   FlowFrame Process(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right,

@@ -11,6 +11,7 @@
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
+#include <sgf/alignment/level.h>
 #include <sgf/alignment/pattern.h>
 #include <sgf/core/camera.h>
 #include <sgf/core/se3.h>
@@ -39,6 +40,7 @@ struct FlowOptions {
   double max_backward_px = 0.5;
   double max_epipolar_error = 0.005;
   double max_disparity_px = 100;
+  alignment::LevelOptions image = {};
   int threads = 1;
 
   template <class V>
@@ -65,6 +67,7 @@ struct FlowOptions {
           "distance of a right point's unit ray from the epipolar plane, else it is dropped");
     visit("max_disparity_px", max_disparity_px, "px",
           "how far a point is searched along its epipolar line where it has no disparity yet");
+    visit("image", image, "", "gradients and their normalisation, one for each patch");
     visit("threads", threads, "", "0 for all cores; the result does not depend on it");
   }
 };

@@ -19,9 +19,10 @@ cv::Mat1f Noise(int rows, int cols) {
   return image;
 }
 
-std::vector<float> Pixels(const SampleChannels& samples) {
-  const float* first = samples.At(0, 0);
-  return {first, first + size_t(4) * samples.rows() * samples.cols()};
+template <int N>
+std::vector<float> Pixels(const ChannelImage<N>& image) {
+  const float* first = image.At(0, 0);
+  return {first, first + size_t(N) * image.rows() * image.cols()};
 }
 
 LevelOptions With(GradientOperator op, metrics::EpsilonScope scope) {
@@ -53,6 +54,27 @@ TEST(SampleChannels, HaveTheGradientsAndEpsilonThatStandOnTheirOwn) {
             EXPECT_NEAR(at[kEpsilon], epsilon(y, x), 1e-4 * epsilon(y, x));
           }
       }
+  }
+}
+
+TEST(GradientChannels, AreThoseOfTheSamples) {
+  for (const auto& [rows, cols] : kSizes) {
+    const cv::Mat1f image = Noise(rows, cols);
+    for (const auto scope : {metrics::EpsilonScope::kImage, metrics::EpsilonScope::kTile}) {
+      const LevelOptions options = With(GradientOperator::kScharr, scope);
+      const SampleChannels samples = MakeSampleChannels(image, options);
+      GradientChannels gradients;
+      const cv::Mat1f epsilon = MakeGradientChannels(image, options, gradients);
+      const bool one = scope == metrics::EpsilonScope::kImage;
+      ASSERT_EQ(epsilon.size(), one ? cv::Size(1, 1) : image.size());
+      for (int y = 0; y < rows; ++y)
+        for (int x = 0; x < cols; ++x) {
+          const float *sample = samples.At(y, x), *gradient = gradients.At(y, x);
+          EXPECT_EQ(gradient[0], sample[kGradientX]);
+          EXPECT_EQ(gradient[1], sample[kGradientY]);
+          EXPECT_EQ(one ? epsilon(0, 0) : epsilon(y, x), sample[kEpsilon]);
+        }
+    }
   }
 }
 

@@ -28,6 +28,7 @@ struct Motion {
   Vector2f shift = {0, 0};
   float angle = 0;
   double gain = 1, offset = 0;
+  double shade_px = INFINITY;  // the gain's radius
 };
 const Vector2f kCentre(160, 120);
 
@@ -38,7 +39,8 @@ cv::Mat1b Render(const Motion& motion) {
     for (int x = 0; x < image.cols; ++x) {
       const double dx = x - kCentre.x() - motion.shift.x(), dy = y - kCentre.y() - motion.shift.y();
       const double grey = Texture(kCentre.x() + c * dx + s * dy, kCentre.y() - s * dx + c * dy);
-      image(y, x) = cv::saturate_cast<uint8_t>(motion.gain * grey + motion.offset);
+      const double gain = std::hypot(dx, dy) < motion.shade_px ? motion.gain : 1;
+      image(y, x) = cv::saturate_cast<uint8_t>(gain * grey + motion.offset);
     }
   return image;
 }
@@ -98,6 +100,19 @@ TEST(PatchTracker, FollowsADarkerImageWhereTheResidualIgnoresGain) {
   for (const char* residual : {"lssd", "ngv", "sgv", "sgf", "sgf3", "sgf3_vec"})
     EXPECT_LT(error(residual), 0.1f) << residual;
   EXPECT_GT(error("photo"), 0.3f);
+}
+
+TEST(PatchTracker, BearsAShadeWhereGradientsAreNormalisedAroundThePatch) {
+  const Motion shaded{{2.4f, 1.3f}, 0, 0.25, 0, 70};
+  const auto error = [&](metrics::EpsilonScope scope) {
+    TrackerOptions options{.residual = "ngv", .levels = 2, .max_iterations = 15};
+    options.image.epsilon.scope = scope;
+    const Found result = TrackCentre(options, shaded);
+    return result.found ? (result.warp.centre - kCentre - shaded.shift).norm() : 1e3f;
+  };
+  const float image = error(metrics::EpsilonScope::kImage);
+  EXPECT_LT(error(metrics::EpsilonScope::kTile), 0.5f * image);
+  EXPECT_LT(error(metrics::EpsilonScope::kWindow), 0.5f * image);
 }
 
 TEST(PatchTracker, TracksWithEveryPattern) {
