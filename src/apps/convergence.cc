@@ -6,8 +6,8 @@
 
 #include <fmt/core.h>
 
+#include <sgf/alignment/as_extracted.h>
 #include <sgf/alignment/patch_alignment.h>
-#include <sgf/apps/as_extracted.h>
 #include <sgf/apps/cli.h>
 #include <sgf/apps/convergence.h>
 #include <sgf/apps/image_change.h>
@@ -124,7 +124,7 @@ void CheckStudy(const ConvergenceOptions& options, const std::string& file) {
 }
 
 void CheckColumn(const Column& column, const std::string& file) {
-  const bool trackable = VisitStudiedResidual(column.residual, [](const auto& residual) {
+  const bool trackable = alignment::VisitStudiedResidual(column.residual, [](const auto& residual) {
     return alignment::kOfSamplesAlone<std::remove_cvref_t<decltype(residual)>>;
   });
   Require(trackable, file,
@@ -345,7 +345,7 @@ auto VisitMotion(PatchMotion motion, const F& f) {
 std::vector<Errors> TrackColumn(const Column& column, const std::vector<SamplePair>& samples,
                                 const Scene& scene) {
   std::vector<Errors> errors;
-  VisitStudiedResidual(column.residual, [&](const auto& residual) {
+  alignment::VisitStudiedResidual(column.residual, [&](const auto& residual) {
     if constexpr (alignment::kOfSamplesAlone<std::remove_cvref_t<decltype(residual)>>)
       VisitMotion(scene.run.motion, [&](auto warp) {
         for (const Start& start : Starts(scene.run))

@@ -66,10 +66,11 @@ struct ConvergenceRequest {
 /// errors on each column's own converged tracks and on those that all compared columns converge on.
 /// A track's error is the root mean square distance (px) of the found and the true places of the
 /// patch's pixels. Of the experiment's keys it reads `study` (ConvergenceOptions), `columns` (by
-/// name: `residual`, as VisitStudiedResidual() knows it, `epsilon` and whether it is `compared`)
-/// and `cases` (by name: `change`, an ImageChange of the second image whose noise goes onto both;
-/// `roll_deg` and `scale` about the image's centre; `motion` of patches; pyramid `levels`;
-/// `start_px`, `start_deg` and `start_pct`, how far off place, angle and scale start, each alone).
+/// name: `residual`, as alignment::VisitStudiedResidual() knows it, `epsilon` and whether it is
+/// `compared`) and `cases` (by name: `change`, an ImageChange of the second image whose noise goes
+/// onto both; `roll_deg` and `scale` about the image's centre; `motion` of patches; pyramid
+/// `levels`; `start_px`, `start_deg` and `start_pct`, how far off place, angle and scale start,
+/// each alone).
 /// @throws Error for a file, name or option that is not as it should be, and for too few points.
 void RunConvergence(const ConvergenceRequest& request);
 

@@ -8,8 +8,8 @@
 
 #include <Eigen/Core>
 
+#include <sgf/alignment/as_extracted.h>
 #include <sgf/alignment/residual.h>
-#include <sgf/alignment/residual_table.h>
 #include <sgf/core/always_inline.h>
 #include <sgf/flow/patch_tracker.h>
 
@@ -48,7 +48,8 @@ struct PaddedPattern {
 /// ngf no minimum at equality.
 using TrackableMetrics =
     std::tuple<metrics::Photo, metrics::Gm, metrics::Gn, metrics::Ugf, metrics::Sgf, metrics::Sgf2,
-               metrics::Sgf3, metrics::Ngv, metrics::Sgv, metrics::Sgf3Vec>;
+               metrics::Sgf3, metrics::Ngv, metrics::Sgv, metrics::Sgf3Vec,
+               alignment::SgfAsExtracted, alignment::Sgf2AsExtracted, alignment::Sgf3AsExtracted>;
 
 template <class Residual, class... Metrics>
 constexpr bool IsOf(std::tuple<Metrics...>*) {

@@ -365,14 +365,14 @@ class TrackerOf final : public PatchTracker {
 };
 
 std::unique_ptr<const PatchTracker> MakeTracker(const TrackerOptions& options) {
-  return alignment::VisitResidual(options.residual,
-                                  [&](const auto& residual) -> std::unique_ptr<const PatchTracker> {
-                                    using Residual = std::remove_cvref_t<decltype(residual)>;
-                                    if constexpr (kTrackable<Residual>)
-                                      return std::make_unique<TrackerOf<Residual>>(options);
-                                    else
-                                      return nullptr;
-                                  });
+  return alignment::VisitStudiedResidual(
+      options.residual, [&](const auto& residual) -> std::unique_ptr<const PatchTracker> {
+        using Residual = std::remove_cvref_t<decltype(residual)>;
+        if constexpr (kTrackable<Residual>)
+          return std::make_unique<TrackerOf<Residual>>(options);
+        else
+          return nullptr;
+      });
 }
 
 }  // namespace HWY_NAMESPACE
@@ -389,7 +389,7 @@ std::unique_ptr<const PatchTracker> MakePatchTracker(const TrackerOptions& optio
 }
 
 bool CanTrack(std::string_view name) {
-  return alignment::VisitResidual(name, [](const auto& residual) {
+  return alignment::VisitStudiedResidual(name, [](const auto& residual) {
     return kTrackable<std::remove_cvref_t<decltype(residual)>>;
   });
 }

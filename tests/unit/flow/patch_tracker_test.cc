@@ -16,6 +16,9 @@ using Eigen::Vector2f;
 
 constexpr const char* kResiduals[] = {"lssd", "photo", "gm",  "gn",  "ugf",     "sgf",
                                       "sgf2", "sgf3",  "ngv", "sgv", "sgf3_vec"};
+// The derivatives of as_extracted.h.
+constexpr const char* kAsExtracted[] = {"sgf_as_extracted", "sgf2_as_extracted",
+                                        "sgf3_as_extracted"};
 
 // A texture with structure at all levels.
 double Texture(double x, double y) {
@@ -167,6 +170,7 @@ TEST(PatchTracker, FindsTheLikeliestOfSeveralPlaces) {
 
 TEST(PatchTracker, TakesResidualsOfSamplesAlone) {
   for (const char* residual : kResiduals) EXPECT_TRUE(CanTrack(residual)) << residual;
+  for (const char* residual : kAsExtracted) EXPECT_TRUE(CanTrack(residual)) << residual;
   for (const char* residual : {"photo_affine", "bit_planes", "ngf", "sad"})
     EXPECT_FALSE(CanTrack(residual)) << residual;
   EXPECT_THAT(ErrorMessage([] { CanTrack("nonsense"); }), testing::HasSubstr("nonsense"));

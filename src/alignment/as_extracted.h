@@ -7,9 +7,9 @@
 #include <sgf/alignment/residual_table.h>
 
 /// The paper's dissimilarities with the derivatives that its text states, as far as a text
-/// extraction shows them (docs/dissimilarities.md), for the study of what those would cost. Values
+/// extraction shows them (docs/dissimilarities.md), for studies of what those would cost. Values
 /// are the exact ones; a derivative is by the gradient of image i.
-namespace sgf::apps {
+namespace sgf::alignment {
 
 /// Eq. 21 with max(|a|, |b|) where the derivative has max(|a|^2, |b|^2).
 struct SgfAsExtracted : metrics::Sgf {
@@ -49,16 +49,15 @@ struct Sgf3AsExtracted : metrics::Sgf3 {
   }
 };
 
-/// As alignment::VisitResidual(), which knows all other names, with `sgf_as_extracted`,
+/// As VisitResidual(), which knows all other names, with `sgf_as_extracted`,
 /// `sgf2_as_extracted` and `sgf3_as_extracted` besides.
 /// @throws Error listing the names of alignment's table.
 template <class F>
 decltype(auto) VisitStudiedResidual(std::string_view name, F&& f) {
-  using alignment::PointResidual;
   if (name == "sgf_as_extracted") return f(PointResidual<SgfAsExtracted>{});
   if (name == "sgf2_as_extracted") return f(PointResidual<Sgf2AsExtracted>{});
   if (name == "sgf3_as_extracted") return f(PointResidual<Sgf3AsExtracted>{});
-  return alignment::VisitResidual(name, std::forward<F>(f));
+  return VisitResidual(name, std::forward<F>(f));
 }
 
-}  // namespace sgf::apps
+}  // namespace sgf::alignment

@@ -3,10 +3,10 @@
 
 #include <gtest/gtest.h>
 
-#include <sgf/apps/as_extracted.h>
+#include <sgf/alignment/as_extracted.h>
 #include <sgf/core/random.h>
 
-namespace sgf::apps {
+namespace sgf::alignment {
 namespace {
 
 metrics::Sample<double> RandomSample(uint64_t seed, double epsilon) {
@@ -53,4 +53,4 @@ TEST(AsExtracted, IsFiniteWhereGradientsVanish) {
 }
 
 }  // namespace
-}  // namespace sgf::apps
+}  // namespace sgf::alignment
