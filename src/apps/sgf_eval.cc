@@ -62,6 +62,8 @@ struct TrajectoryCommand {
     truth.require_option(1);
     app.add_option("--common", request.common,
                    "TUM files of other estimates: compare only poses at times that all have");
+    app.add_option("--covariances", request.covariances,
+                   "covariances.csv of sgf_vio: how well the errors agree with it");
     app.add_option("--out", request.output, "file to write: *.json, or else CSV");
     app.add_option("--aligned", request.aligned,
                    "TUM file to write: poses of the body in the world of the ground truth");

@@ -207,6 +207,22 @@ void WriteStates(const fs::path& file, const Run& run) {
   WriteTextFile(file, text);
 }
 
+void WriteCovariances(const fs::path& file, const Run& run) {
+  std::string text =
+      "# time_ns, then the lower triangle, row by row, of the covariance of: rotation (rad, on the "
+      "right), position (m), velocity (m/s), bias of the gyroscope (rad/s), of the accelerometer "
+      "(m/s^2)\n";
+  for (const vio::VioFrameResult& f : run.frames) {
+    if (!HasState(f)) continue;
+    text += fmt::format("{}", f.time_ns);
+    for (int row = 0; row < vio::kStateSize; ++row)
+      for (int column = 0; column <= row; ++column)
+        text += fmt::format(",{:.7g}", f.covariance(row, column));
+    text += "\n";
+  }
+  WriteTextFile(file, text);
+}
+
 void WriteTimings(const fs::path& file, const Run& run) {
   std::string text =
       "time_ns,pyramid_ms,tracking_ms,stereo_ms,detection_ms,flow_ms,refinement_ms,"
@@ -276,6 +292,7 @@ void RunVio(const Arguments& arguments, const OptionFlags& flags) {
   const Run run = TrackSequence(sequence, frames, arguments, options, events, points);
   WriteTrajectory(folder / "trajectory.txt", Trajectory(run));
   WriteStates(folder / "states.csv", run);
+  WriteCovariances(folder / "covariances.csv", run);
   WriteTimings(folder / "timings.csv", run);
   WriteRunOptions(folder / "options.yaml", WriteOptions(options));
   events.Close();
@@ -291,7 +308,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Stereo-inertial odometry: writes trajectory.txt (TUM format: the body's pose at each "
       "frame's "
-      "time, as known then), states.csv (velocity, biases and deviations), points.ply, "
+      "time, as known then), states.csv (velocity, biases and deviations), "
+      "covariances.csv, points.ply, "
       "events.jsonl, timings.csv, summary.json and options.yaml.",
       "sgf_vio");
   arguments.run.AddTo(app);

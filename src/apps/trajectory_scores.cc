@@ -58,6 +58,9 @@ TrajectoryScores Score(const std::vector<TimedPose>& estimate,
                            request.options.trajectory);
   };
   TrajectoryScores scores = score(compared);
+  if (!request.covariances.empty())
+    scores.nees = ScoreConsistency(compared, ReadPoseCovariances(request.covariances),
+                                   reference.truth, request.options.trajectory.max_truth_gap_s);
   if (request.common.empty()) return scores;
   scores.coverage_pct = score(estimate).coverage_pct;
   return scores;

@@ -37,6 +37,7 @@ struct TrajectoryScoreRequest {
   /// TUM files of other estimates: only poses at times that all of them have are compared. Coverage
   /// stays that of the estimate itself.
   std::vector<std::string> common;
+  std::string covariances;     ///< of the estimate, a file as sgf_vio writes it, or empty
   std::string output;          ///< file to write: *.json, or else CSV; empty for none
   std::string aligned;         ///< TUM file to write: the body in the truth's world; empty for none
   std::string points;          ///< PLY file with points of the estimate's world, or empty

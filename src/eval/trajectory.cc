@@ -191,7 +191,7 @@ TrajectoryScores NoScores() {
     if constexpr (std::is_same_v<decltype(value), double&>) value = kNan;
   };
   scores.VisitFields([&](const char*, auto& value, const char*, const char*) {
-    if constexpr (std::is_same_v<decltype(value), RelativeErrors&>)
+    if constexpr (std::is_class_v<std::remove_reference_t<decltype(value)>>)
       value.VisitFields([&](const char*, auto& inner, const char*, const char*) { clear(inner); });
     else
       clear(value);
@@ -258,6 +258,33 @@ TrajectoryScores ScoreTrajectory(std::span<const TimedPose> estimate,
   scores.rpe_half_second = ScoreStretches(pairs, path, 500'000'000);
   scores.rpe_one_second = ScoreStretches(pairs, path, 1'000'000'000);
   return scores;
+}
+
+Consistency ScoreConsistency(std::span<const TimedPose> estimate,
+                             std::span<const PoseCovariance> covariances,
+                             std::span<const TimedPose> truth, double max_truth_gap_s) {
+  const PosePairs pairs = Associate(estimate, truth, max_truth_gap_s);
+  std::vector<double> pose, rotation, position;
+  auto known = covariances.begin();
+  for (size_t k = 1; k < pairs.size(); ++k) {
+    known = std::find_if(known, covariances.end(),
+                         [&](const PoseCovariance& c) { return c.time_ns >= pairs[k].time_ns; });
+    if (known == covariances.end()) break;
+    if (known->time_ns != pairs[k].time_ns) continue;
+    const SE3 expected = pairs.front().estimate * (pairs.front().truth.Inverse() * pairs[k].truth);
+    Eigen::Matrix<double, 6, 1> error;
+    error << LogSO3(pairs[k].estimate.R.conjugate() * expected.R), expected.p - pairs[k].estimate.p;
+    const Eigen::LLT<Eigen::Matrix<double, 6, 6>> factor(known->covariance);
+    if (factor.info() != Eigen::Success) continue;
+    const auto part = [&](int begin) {
+      const Eigen::Vector3d e = error.segment<3>(begin);
+      return e.dot(known->covariance.block<3, 3>(begin, begin).llt().solve(e));
+    };
+    pose.push_back(error.dot(factor.solve(error)));
+    rotation.push_back(part(0));
+    position.push_back(part(3));
+  }
+  return {Mean(pose), Mean(rotation), Mean(position)};
 }
 
 }  // namespace sgf

@@ -50,6 +50,21 @@ struct RelativeErrors {
   }
 };
 
+/// Normalised estimation errors squared, e^T P^-1 e, averaged over poses. An estimator that knows
+/// how good it is has as much as there are degrees of freedom: 6, 3 and 3.
+struct Consistency {
+  double pose = 0;
+  double rotation = 0;
+  double position = 0;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("pose", pose, "", "of the pose (6 where the covariance is true)");
+    visit("rotation", rotation, "", "of the rotation (3)");
+    visit("position", position, "", "of the position (3)");
+  }
+};
+
 /// Errors of a trajectory against ground truth. All but the counts are NaN where fewer than three
 /// poses can be compared, and those of a stretch of time where no stretch can.
 struct TrajectoryScores {
@@ -71,6 +86,7 @@ struct TrajectoryScores {
   double scale_error_median_m = 0;
   bool success_by_scale = false;  ///< scale errors of at most 1.5 m, median of at most 0.1 m
   bool success_by_ate = false;    ///< the same limits on the position errors
+  Consistency nees;               ///< ScoreConsistency(); NaN where no covariances are known
 
   template <class V>
   void VisitFields(V&& visit) {
@@ -92,6 +108,7 @@ struct TrajectoryScores {
     visit("scale_error_median_m", scale_error_median_m, "m", "its median");
     visit("success_by_scale", success_by_scale, "", "those at most 1.5 m and 0.1 m");
     visit("success_by_ate", success_by_ate, "", "position errors at most 1.5 m, median 0.1 m");
+    visit("nees", nees, "", "normalised estimation error squared");
   }
 };
 
@@ -142,5 +159,15 @@ TrajectoryScores ScoreTrajectory(std::span<const TimedPose> estimate,
                                  std::span<const TimedPose> truth, const SE3& T_body_est,
                                  std::span<const std::int64_t> frame_times_ns,
                                  const TrajectoryOptions& options);
+
+/// Compares the errors of poses with the covariances that are stated for them. Errors are those of
+/// the pose relative to the first compared one, where the true trajectory is laid onto the
+/// estimate.
+/// @param estimate, truth of one frame, as ScoreTrajectory() takes them.
+/// @param covariances of increasing times, of that frame. Singular ones are left out.
+/// @return NaN where no pose but the first can be compared.
+Consistency ScoreConsistency(std::span<const TimedPose> estimate,
+                             std::span<const PoseCovariance> covariances,
+                             std::span<const TimedPose> truth, double max_truth_gap_s);
 
 }  // namespace sgf

@@ -38,4 +38,20 @@ void WriteTrajectory(const std::filesystem::path& path, std::span<const TimedPos
   WriteTextFile(path, text);
 }
 
+std::vector<PoseCovariance> ReadPoseCovariances(const std::filesystem::path& path) {
+  constexpr int kRows = 15, kPoseRows = 6;
+  std::vector<PoseCovariance> covariances;
+  ForEachRow(path, ',', 1 + kRows * (kRows + 1) / 2,
+             [&](const Fields& fields, const std::string& where) {
+               PoseCovariance read{NumberField<std::int64_t>(fields[0], where)};
+               size_t field = 1;
+               for (int row = 0; row < kPoseRows; ++row)
+                 for (int column = 0; column <= row; ++column)
+                   read.covariance(row, column) = read.covariance(column, row) =
+                       NumberField<double>(fields[field++], where);
+               AppendLater(covariances, read, where);
+             });
+  return covariances;
+}
+
 }  // namespace sgf

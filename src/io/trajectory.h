@@ -21,4 +21,10 @@ std::vector<TimedPose> ReadTrajectory(const std::filesystem::path& path);
 /// @throws Error naming the file for times out of order and a file that cannot be written.
 void WriteTrajectory(const std::filesystem::path& path, std::span<const TimedPose> poses);
 
+/// Reads the covariances of poses from a file of covariances of whole states: rows of the time (ns)
+/// and the lower triangle, row by row, of a matrix of 15 rows whose first six are a pose's.
+/// @throws Error naming file and line: a wrong number of columns, a number that is none, times that
+///   do not increase; as ReadFile().
+std::vector<PoseCovariance> ReadPoseCovariances(const std::filesystem::path& path);
+
 }  // namespace sgf

@@ -305,6 +305,44 @@ TEST(Trajectory, IsCutToTheTimesOfAnother) {
   EXPECT_EQ(common[1].pose.p, poses[4].pose.p);
 }
 
+// ---- Consistency
+
+TEST(Consistency, IsThatOfTheDegreesOfFreedomWhereCovariancesAreTrue) {
+  const Poses truth = Walk(600);
+  Poses estimate = Moved(truth, {ExpSO3({0.2, -1, 0.4}), {3, 1, -2}}, {}, 1);
+  Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::Zero();
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column <= row; ++column) root(row, column) = row == column ? 0.02 : 0.01;
+  std::vector<PoseCovariance> covariances;
+  for (size_t k = 1; k < estimate.size(); ++k) {
+    Eigen::Matrix<double, 6, 1> white;
+    for (int i = 0; i < 6; ++i) white(i) = Gaussian(k, i);
+    const Eigen::Matrix<double, 6, 1> e = root * white;
+    SE3& pose = estimate[k].pose;
+    pose = {pose.R * ExpSO3(e.head<3>()).conjugate(), pose.p - e.tail<3>()};
+    covariances.push_back({estimate[k].time_ns, root * root.transpose()});
+  }
+  const Consistency nees = ScoreConsistency(estimate, covariances, truth, 0.06);
+  EXPECT_NEAR(nees.pose, 6, 0.6);  // four standard deviations of the mean
+  EXPECT_NEAR(nees.rotation, 3, 0.4);
+  EXPECT_NEAR(nees.position, 3, 0.4);
+  for (PoseCovariance& c : covariances) c.covariance *= 4;
+  EXPECT_NEAR(ScoreConsistency(estimate, covariances, truth, 0.06).pose, nees.pose / 4, 1e-9);
+}
+
+TEST(Consistency, LeavesOutWhatIsNotKnown) {
+  const Poses truth = Walk(4);
+  const auto nees = [&](const std::vector<PoseCovariance>& covariances) {
+    return ScoreConsistency(truth, covariances, truth, 0.06).pose;
+  };
+  EXPECT_TRUE(std::isnan(nees({})));
+  EXPECT_TRUE(std::isnan(
+      nees({{truth[1].time_ns, 0 * Eigen::Matrix<double, 6, 6>::Identity()}})));  // singular
+  const Eigen::Matrix<double, 6, 6> one = Eigen::Matrix<double, 6, 6>::Identity();
+  EXPECT_TRUE(std::isnan(nees({{truth[0].time_ns, one}})));  // where errors are measured from
+  EXPECT_NEAR(nees({{truth[1].time_ns + 5, one}, {truth[2].time_ns, one}}), 0, 1e-20);
+}
+
 TEST(Trajectory, OfTwoPosesIsNoTrajectory) {
   const Poses truth = Walk(50);
   for (const int poses : {0, 2}) {

@@ -2,6 +2,7 @@
 #include <limits>
 #include <vector>
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -95,6 +96,26 @@ TEST(Trajectory, ReportsBadLines) {
   EXPECT_THAT(message("1 0 0 0 0 0 0 2\n"), EndsWith("t.txt:1: quaternion has norm 2, expected 1"));
   EXPECT_THAT(message("1 0 0 0 0 0 0 1\n1.0 0 0 0 0 0 0 1\n"),
               EndsWith("t.txt:2: time 1000000000 is not after 1000000000"));
+}
+
+TEST(PoseCovariances, AreTheFirstRowsOfAState) {
+  const TempDir dir;
+  std::string row;
+  for (int k = 1; k <= 120; ++k) row += fmt::format(",{}", k);
+  const auto read = [&](const std::string& text) {
+    return ReadPoseCovariances(dir.Write("c.csv", text));
+  };
+  const auto covariances = read("# of states\n5" + row + "\n7" + row + "\n");
+  ASSERT_EQ(covariances.size(), 2u);
+  EXPECT_EQ(covariances[1].time_ns, 7);
+  EXPECT_EQ(covariances[1].covariance(0, 0), 1);
+  EXPECT_EQ(covariances[1].covariance(5, 0), 16);
+  EXPECT_EQ(covariances[1].covariance(0, 5), 16);
+  EXPECT_EQ(covariances[1].covariance(5, 5), 21);
+  EXPECT_THAT(ErrorMessage([&] { read("5,1,2\n"); }),
+              EndsWith("c.csv:1: has 3 columns, expected 121"));
+  EXPECT_THAT(ErrorMessage([&] { read("5" + row + "\n5" + row + "\n"); }),
+              EndsWith("c.csv:2: time 5 is not after 5"));
 }
 
 TEST(Trajectory, RefusesToWriteTimesOutOfOrder) {
