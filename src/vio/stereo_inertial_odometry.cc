@@ -350,7 +350,10 @@ class StereoInertialOdometry::Impl {
     last_ = newest.state;
     if (!newest.inertial) last_.velocity = SeenVelocity();
     result.body = last_;
-    if (options_.covariance) result.covariance = window_.CovarianceOf(newest);
+    if (!options_.covariance) return;
+    const FrameCovariance known = window_.CovarianceOf(newest);
+    result.covariance = known.state;
+    result.covariance_since_last = known.since_last;
   }
 
   /// Velocity from the last two poses, m/s.
@@ -449,7 +452,8 @@ class StereoInertialOdometry::Impl {
   }
 
   VioPoint ToPoint(const Landmark& landmark) const {
-    return {.position = R_gravity_world_.conjugate() * PositionOf(landmark),
+    return {.host_ns = window_.Find(landmark.host)->state.time_ns,
+            .position = R_gravity_world_.conjugate() * PositionOf(landmark),
             .inverse_depth = landmark.inverse_depth,
             .inverse_depth_variance = landmark.inverse_depth_variance,
             .support = static_cast<int>(landmark.sights.size()),
