@@ -95,9 +95,12 @@ struct VioFrameResult {
   InitialisationProblem problem = InitialisationProblem::kNone;
   /// Of the state, in the order of Plus(). Of velocity and biases 0 without inertial sensor.
   StateMatrix covariance = StateMatrix::Zero();
-  /// Of the body in its coordinates at the last frame that had a state, in the order of Plus(). 0
-  /// for the first frame of a map.
-  Eigen::Matrix<double, kPoseParameters, kPoseParameters> covariance_since_last =
+  /// The body in its coordinates at the frame before, as both are known now: not what is between
+  /// the poses that were given out, as that of the frame before has been refined since. Identity
+  /// and 0 for the first frame of a map.
+  SE3 motion = {};
+  /// Of the motion, in the order of Plus().
+  Eigen::Matrix<double, kPoseParameters, kPoseParameters> motion_covariance =
       Eigen::Matrix<double, kPoseParameters, kPoseParameters>::Zero();
   bool new_keyframe = false;
   int tracks = 0, stereo_tracks = 0;

@@ -561,8 +561,8 @@ FrameCovariance Window::CovarianceOf(const Frame& frame) const {
   const std::array poses = {at.OffsetOf({before.id, false}), pose};
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
-      covariance.since_last += J.middleCols<6>(6 * i) * inverse.block<6, 6>(poses[i], poses[j]) *
-                               J.middleCols<6>(6 * j).transpose();
+      covariance.motion += J.middleCols<6>(6 * i) * inverse.block<6, 6>(poses[i], poses[j]) *
+                           J.middleCols<6>(6 * j).transpose();
   return covariance;
 }
 

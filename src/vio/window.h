@@ -91,7 +91,7 @@ struct FrameCovariance {
   /// Of the state in the order of Plus(): pose and, where the frame is inertial, motion; else 0.
   StateMatrix state = StateMatrix::Zero();
   /// Of the pose in coordinates of the frame before, in the same order; 0 for the oldest frame.
-  Eigen::Matrix<double, kPoseParameters, kPoseParameters> since_last =
+  Eigen::Matrix<double, kPoseParameters, kPoseParameters> motion =
       Eigen::Matrix<double, kPoseParameters, kPoseParameters>::Zero();
 };
 

@@ -40,6 +40,16 @@ Matrix6d inTangent(const Matrix6d& cov, const Eigen::Quaterniond& R)
 	return J * cov * J.transpose();
 }
 
+// Covariance of the increment between the poses that were given out. How the
+// last one has been corrected since is known, and counts as an error.
+Matrix6d ofIncrement(const VioFrameResult& r, const SE3& increment)
+{
+	const SE3 correction = r.motion.Inverse() * increment;
+	Eigen::Matrix<double, 6, 1> v;
+	v << correction.p, ::sgf::LogSO3(correction.R);
+	return inTangent(r.motion_covariance, r.motion.R) + v * v.transpose();
+}
+
 TVector3D toVector(const Eigen::Vector3d& v)
 {
 	return {v.x(), v.y(), v.z()};
@@ -205,8 +215,6 @@ class CStereoInertialEstimator : public CEstimator
 	{
 		const SE3& T = r.body.T_world_body;
 		const Matrix6d A = adjoint(m_T_robot_body);
-		const auto onRobot = [&](const Matrix6d& cov, const auto& R)
-		{ return Matrix6d(A * inTangent(cov, R) * A.transpose()); };
 		if (!m_T_map_world) m_T_map_world = T_world_robot(r).Inverse();
 		e.T_map_robot = *m_T_map_world * T_world_robot(r);
 		e.begins = !m_last || r.segment != m_segment;
@@ -214,9 +222,11 @@ class CStereoInertialEstimator : public CEstimator
 		if (!e.begins)
 		{
 			e.anchor = m_anchors - 1;
-			e.sinceAnchor = onRobot(r.covariance.topLeftCorner<6, 6>(), T.R);
-			e.sinceLast = onRobot(
-				r.covariance_since_last, m_last->R.conjugate() * T.R);
+			e.sinceAnchor =
+				A * inTangent(r.covariance.topLeftCorner<6, 6>(), T.R) *
+				A.transpose();
+			e.sinceLast =
+				A * ofIncrement(r, m_last->Inverse() * T) * A.transpose();
 		}
 		const int judged = r.window.sights + r.window.outliers;
 		if (judged > 0) e.inlierShare = double(r.window.sights) / judged;

@@ -55,7 +55,7 @@ Nees Measure(int states, int keyframes, const SimulatedWindow::Options& options)
         Minus(MotionOf(simulated.TruthOf(before.id), simulated.TruthOf(newest.id)),
               MotionOf(before.state, newest.state))
             .head<kPoseParameters>();
-    nees.motion += moved.dot(covariance.since_last.ldlt().solve(moved)) / kRuns;
+    nees.motion += moved.dot(covariance.motion.ldlt().solve(moved)) / kRuns;
     nees.pose += part(kRotation, 6);
     nees.rotation += part(kRotation, 3);
     nees.position += part(kPosition, 3);
