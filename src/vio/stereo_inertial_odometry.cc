@@ -137,14 +137,14 @@ class StereoInertialOdometry::Impl {
       const SE3 motion = before.T_world_body.Inverse() * last->state.T_world_body;
       frame.state.T_world_body = last->state.T_world_body * PartOf(motion, share);
     }
-    if (frame.since_last)
+    if (frame.since_last && !doubts_gyro_)
       frame.state.T_world_body.R = last->state.T_world_body.R * frame.since_last->delta_R();
     return frame;
   }
 
   std::optional<Eigen::Quaterniond> RotationSinceLast(const Frame& frame) const {
     const Frame* last = Newest();
-    if (!last || !frame.since_last) return std::nullopt;
+    if (!last || !frame.since_last || doubts_gyro_) return std::nullopt;
     const Eigen::Quaterniond R_body_left = window_.rig().T_body_cam[0].R;
     return R_body_left.conjugate() * frame.state.T_world_body.R.conjugate() *
            last->state.T_world_body.R * R_body_left;
@@ -220,6 +220,7 @@ class StereoInertialOdometry::Impl {
     motion << Vector3d::Constant(kVelocitySigma), found.gyro_bias_sd, found.accel_bias_sd;
     window_.AnchorMotion(window_.frames[first], motion);
     inertial_ = true;
+    doubts_gyro_ = false;
     start_.Clear();
     R_gravity_world_ = found.T_world_visual.R * R_gravity_world_;
     last_ = window_.frames.back().state;
@@ -350,7 +351,13 @@ class StereoInertialOdometry::Impl {
     last_ = newest.state;
     if (!newest.inertial) last_.velocity = SeenVelocity();
     result.body = last_;
-    if (options_.covariance) result.covariance = window_.CovarianceOf(newest);
+    if (!first)
+      result.motion = std::prev(window_.frames.end(), 2)->state.T_world_body.Inverse() *
+                      newest.state.T_world_body;
+    if (!options_.covariance) return;
+    const FrameCovariance known = window_.CovarianceOf(newest);
+    result.covariance = known.state;
+    result.motion_covariance = known.motion;
   }
 
   /// Velocity from the last two poses, m/s.
@@ -381,6 +388,8 @@ class StereoInertialOdometry::Impl {
   /// A new map begins at the last believed state.
   void Lose() {
     for (const auto& [id, landmark] : window_.landmarks) finished_.push_back(ToPoint(landmark));
+    // Rates that were never verified may be why: in degrees they lead the flow astray.
+    doubts_gyro_ = !inertial_;
     Forget();
     ++segment_;
   }
@@ -449,7 +458,8 @@ class StereoInertialOdometry::Impl {
   }
 
   VioPoint ToPoint(const Landmark& landmark) const {
-    return {.position = R_gravity_world_.conjugate() * PositionOf(landmark),
+    return {.host_ns = window_.Find(landmark.host)->state.time_ns,
+            .position = R_gravity_world_.conjugate() * PositionOf(landmark),
             .inverse_depth = landmark.inverse_depth,
             .inverse_depth_variance = landmark.inverse_depth_variance,
             .support = static_cast<int>(landmark.sights.size()),
@@ -468,6 +478,7 @@ class StereoInertialOdometry::Impl {
   BodyState last_;
   Eigen::Quaterniond R_gravity_world_ = Eigen::Quaterniond::Identity();
   bool inertial_ = false;  ///< the inertial sensor takes part
+  bool doubts_gyro_ = false;
   InertialStart start_;
   int next_id_ = 0;
   int since_keyframe_ = 0;

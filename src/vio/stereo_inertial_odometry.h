@@ -95,6 +95,13 @@ struct VioFrameResult {
   InitialisationProblem problem = InitialisationProblem::kNone;
   /// Of the state, in the order of Plus(). Of velocity and biases 0 without inertial sensor.
   StateMatrix covariance = StateMatrix::Zero();
+  /// The body in its coordinates at the frame before, as both are known now: not what is between
+  /// the poses that were given out, as that of the frame before has been refined since. Identity
+  /// and 0 for the first frame of a map.
+  SE3 motion = {};
+  /// Of the motion, in the order of Plus().
+  Eigen::Matrix<double, kPoseParameters, kPoseParameters> motion_covariance =
+      Eigen::Matrix<double, kPoseParameters, kPoseParameters>::Zero();
   bool new_keyframe = false;
   int tracks = 0, stereo_tracks = 0;
   int landmarks = 0;  ///< seen in this frame
@@ -105,6 +112,7 @@ struct VioFrameResult {
 
 /// A landmark that has left the window, or is in it.
 struct VioPoint {
+  std::int64_t host_ns = 0;                            ///< time of its key-frame
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, m
   double inverse_depth = 0, inverse_depth_variance = 0;
   int support = 0;  ///< sights in the window when it left

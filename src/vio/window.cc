@@ -495,7 +495,26 @@ void Window::Marginalize(std::span<const int> leaving, std::span<const int> moti
   }
 }
 
-Matrix15 Window::CovarianceOf(const Frame& frame) const {
+namespace {
+
+using MotionJacobian = Eigen::Matrix<double, kPoseParameters, 2 * kPoseParameters>;
+
+/// How a pose in coordinates of the one before changes with both, all in the order of Plus().
+MotionJacobian JacobianOfMotion(const SE3& before, const SE3& now) {
+  const SE3 motion = before.Inverse() * now;
+  const Matrix3d R = before.R.conjugate().toRotationMatrix();
+  MotionJacobian J = MotionJacobian::Zero();
+  J.block<3, 3>(kRotation, kRotation) = -motion.R.conjugate().toRotationMatrix();
+  J.block<3, 3>(kPosition, kRotation) = HatSO3(motion.p);
+  J.block<3, 3>(kPosition, kPosition) = -R;
+  J.block<3, 3>(kRotation, kPoseParameters + kRotation).setIdentity();
+  J.block<3, 3>(kPosition, kPoseParameters + kPosition) = R;
+  return J;
+}
+
+}  // namespace
+
+FrameCovariance Window::CovarianceOf(const Frame& frame) const {
   std::deque<Frame> copy = frames;
   std::map<std::int64_t, Landmark> seen = landmarks;
   Linearization at(copy);
@@ -526,15 +545,24 @@ Matrix15 Window::CovarianceOf(const Frame& frame) const {
   const MatrixXd inverse = unit.asDiagonal() *
                            scaled.ldlt().solve(MatrixXd::Identity(H.rows(), H.cols())) *
                            unit.asDiagonal();
-  Matrix15 covariance = Matrix15::Zero();
+  FrameCovariance covariance;
   const Index pose = at.OffsetOf({frame.id, false});
-  covariance.topLeftCorner<6, 6>() = inverse.block<6, 6>(pose, pose);
+  covariance.state.topLeftCorner<6, 6>() = inverse.block<6, 6>(pose, pose);
   if (frame.inertial) {
     const Index motion = at.OffsetOf({frame.id, true});
-    covariance.bottomRightCorner<9, 9>() = inverse.block<9, 9>(motion, motion);
-    covariance.topRightCorner<6, 9>() = inverse.block<6, 9>(pose, motion);
-    covariance.bottomLeftCorner<9, 6>() = inverse.block<9, 6>(motion, pose);
+    covariance.state.bottomRightCorner<9, 9>() = inverse.block<9, 9>(motion, motion);
+    covariance.state.topRightCorner<6, 9>() = inverse.block<6, 9>(pose, motion);
+    covariance.state.bottomLeftCorner<9, 6>() = inverse.block<9, 6>(motion, pose);
   }
+  if (frame.id == frames.front().id) return covariance;
+  const Frame& before = *std::prev(
+      std::find_if(frames.begin(), frames.end(), [&](const Frame& f) { return f.id == frame.id; }));
+  const MotionJacobian J = JacobianOfMotion(before.state.T_world_body, frame.state.T_world_body);
+  const std::array poses = {at.OffsetOf({before.id, false}), pose};
+  for (int i = 0; i < 2; ++i)
+    for (int j = 0; j < 2; ++j)
+      covariance.motion += J.middleCols<6>(6 * i) * inverse.block<6, 6>(poses[i], poses[j]) *
+                           J.middleCols<6>(6 * j).transpose();
   return covariance;
 }
 

@@ -86,6 +86,15 @@ struct WindowSummary {
   bool usable = false;
 };
 
+/// How well a frame of the window is known, given all measurements and the prior.
+struct FrameCovariance {
+  /// Of the state in the order of Plus(): pose and, where the frame is inertial, motion; else 0.
+  StateMatrix state = StateMatrix::Zero();
+  /// Of the pose in coordinates of the frame before, in the same order; 0 for the oldest frame.
+  Eigen::Matrix<double, kPoseParameters, kPoseParameters> motion =
+      Eigen::Matrix<double, kPoseParameters, kPoseParameters>::Zero();
+};
+
 /// Frames, oldest first, landmarks by their track's id, and what is known from before. Same bits
 /// for any number of threads.
 class Window {
@@ -130,9 +139,7 @@ class Window {
   /// @param frames ids. @param motions ids of frames whose motion alone leaves.
   void Marginalize(std::span<const int> frames, std::span<const int> motions);
 
-  /// Covariance of a frame in the order of Plus(), of its pose and, where it is inertial, motion;
-  /// the rest is 0. Given all measurements of the window and the prior.
-  Eigen::Matrix<double, 15, 15> CovarianceOf(const Frame& frame) const;
+  FrameCovariance CovarianceOf(const Frame& frame) const;
 
  private:
   VioRig rig_;

@@ -64,6 +64,7 @@ void run(const TArguments& arguments)
 	const auto source = openObservations(arguments.input);
 	CSgfOdometryNRD<TGraph> nodes;
 	CSgfLoopClosureERD<TGraph> loops;
+	loops.setNodeTimes(nodes.nodeTimes());
 	mrpt::graphslam::deciders::CEmptyERD<TGraph> noLoops;
 	mrpt::graphslam::optimizers::CLevMarqGSO<TGraph> optimizer;
 	mrpt::graphslam::deciders::CEdgeRegistrationDecider<TGraph>* edges =

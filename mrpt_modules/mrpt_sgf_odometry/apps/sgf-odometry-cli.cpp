@@ -150,6 +150,7 @@ void run(const TArguments& arguments)
 			++frames;
 			logs.take(*result);
 		}
+	while (const auto result = odometry.finish()) logs.take(*result);
 	std::cout << odometry.report();
 	reportIncomplete(*source);
 	if (frames == 0)

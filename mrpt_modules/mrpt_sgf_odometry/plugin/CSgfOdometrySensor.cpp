@@ -107,11 +107,14 @@ void CSgfOdometrySensor::doProcess()
 	{
 		if (m_emitSource) appendObservation(obs);
 		m_lastTime = std::max(m_lastTime, obs->timestamp);
-		if (const auto result = m_odometry.processObservation(*obs))
+		const auto result = m_odometry.processObservation(*obs);
+		if (result && result->quality != TQuality::WAITING)
 			return emit(*result);
 	}
 	// A camera has no end: there was no image in this period.
-	if (!m_camera) emitReport();
+	if (m_camera) return;
+	if (const auto result = m_odometry.finish()) return emit(*result);
+	emitReport();
 }
 
 void CSgfOdometrySensor::emit(const TResult& result)

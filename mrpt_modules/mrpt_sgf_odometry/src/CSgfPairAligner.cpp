@@ -38,7 +38,7 @@ struct CSgfPairAligner::Impl
 };
 
 CSgfPairAligner::CSgfPairAligner(const CSgfOdometry::TParams& params)
-	: m_impl(new Impl{odometryOptions(params, "parameters"), {}, {}})
+	: m_impl(new Impl{odometryOptions(params, "parameters"), CFrameMaker(), {}})
 {
 }
 

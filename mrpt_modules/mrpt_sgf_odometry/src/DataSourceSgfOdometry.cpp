@@ -19,15 +19,16 @@ bool DataSourceSgfOdometry::impl_get_next_observations(
 	ASSERTMSG_(source, "DataSourceSgfOdometry::source is not set");
 	observation.reset();
 	auto others = mrpt::obs::CSensoryFrame::Create();
-	while (const auto obs = internal::nextOrEnd(*source, odometry))
+	while (true)
 	{
-		const auto result = odometry.processObservation(*obs);
-		if (!result)
-		{
+		const auto obs = internal::nextOrEnd(*source, odometry);
+		const auto result =
+			obs ? odometry.processObservation(*obs) : odometry.finish();
+		if (!obs && !result) return false;
+		// An inertial observation may come with a result, of a frame before.
+		if (obs && (!result || IS_CLASS(*obs, mrpt::obs::CObservationIMU)))
 			others->insert(obs);
-			continue;
-		}
-		if (!result->increment) continue;
+		if (!result || !result->increment) continue;
 		auto movement = result->asAction();
 		action = mrpt::obs::CActionCollection::Create();
 		action->insert(movement);
@@ -35,7 +36,6 @@ bool DataSourceSgfOdometry::impl_get_next_observations(
 		for (const auto& other : *others) observations->insert(other);
 		return true;
 	}
-	return false;
 }
 
 }  // namespace mrpt::sgf

@@ -65,6 +65,23 @@ mrpt::poses::CPose3D toPose(const ::sgf::SE3& T)
 	return mrpt::poses::CPose3D(m);
 }
 
+bool isFinite(const mrpt::poses::CPose3D& pose)
+{
+	return pose.getHomogeneousMatrixVal<mrpt::math::CMatrixDouble44>()
+		.asEigen()
+		.allFinite();
+}
+
+mrpt::img::TCamera toTCamera(const ::sgf::Camera& in)
+{
+	mrpt::img::TCamera out;
+	out.ncols = in.width;
+	out.nrows = in.height;
+	out.setIntrinsicParamsFromValues(in.fx, in.fy, in.cx, in.cy);
+	if (in.distorted()) out.setDistortionPlumbBob(in.k1, in.k2, in.p1, in.p2);
+	return out;
+}
+
 Matrix6d adjoint(const ::sgf::SE3& T_a_b)
 {
 	const Eigen::Matrix3d R = T_a_b.R.toRotationMatrix();

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <mrpt/core/Clock.h>
+#include <mrpt/img/TCamera.h>
 #include <mrpt/poses/CPose3D.h>
 #include <mrpt/poses/CPose3DPDFGaussian.h>
 
@@ -14,6 +15,7 @@
 
 #include <Eigen/Core>
 
+#include <sgf/core/camera.h>
 #include <sgf/core/se3.h>
 
 /** Between sgf's types and MRPT's. */
@@ -23,6 +25,10 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 ::sgf::SE3 toSE3(const mrpt::poses::CPose3D& pose);
 mrpt::poses::CPose3D toPose(const ::sgf::SE3& T);
+bool isFinite(const mrpt::poses::CPose3D& pose);
+
+/** A camera without distortion, or with that by k1, k2, p1, p2. */
+mrpt::img::TCamera toTCamera(const ::sgf::Camera& camera);
 
 /** Matrix that carries a tangent vector (translation before rotation) of frame
  * b to frame a: T Exp(v) T^-1 = Exp(Ad v). */

@@ -54,16 +54,6 @@ struct TLayoutOption
 	return ::sgf::OpenOdometrySequence(folder, option.layout);
 }
 
-mrpt::img::TCamera toTCamera(const ::sgf::Camera& in)
-{
-	mrpt::img::TCamera out;
-	out.ncols = in.width;
-	out.nrows = in.height;
-	out.setIntrinsicParamsFromValues(in.fx, in.fy, in.cx, in.cy);
-	if (in.distorted()) out.setDistortionPlumbBob(in.k1, in.k2, in.p1, in.p2);
-	return out;
-}
-
 // An image that stays in its file until it is looked at.
 mrpt::img::CImage externalImage(const std::filesystem::path& file)
 {
@@ -93,9 +83,13 @@ class CDatasetSource : public CObservationSource
 	{
 		constexpr auto kNever = std::numeric_limits<std::int64_t>::max();
 		const auto& [frames, imu] = std::tie(m_sequence.frames, m_sequence.imu);
-		const bool moreFrames = m_frame < frames.size();
-		// Inertial data after the last frame is of no use.
-		if (!moreFrames) return {};
+		if (m_frame == frames.size())
+		{
+			// One more, to interpolate at the last frame's time.
+			const bool more = m_sample > 0 && m_sample < imu.size() &&
+							  imu[m_sample - 1].time_ns < frames.back().time_ns;
+			return more ? inertial(imu[m_sample++]) : nullptr;
+		}
 		const auto rates_ns =
 			m_sample < imu.size() ? imu[m_sample].time_ns : kNever;
 		if (rates_ns <= frames[m_frame].time_ns)

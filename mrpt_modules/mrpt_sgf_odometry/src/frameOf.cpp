@@ -150,9 +150,7 @@ void CFrameMaker::TCalibration::check() const
 	checkedCamera(first);
 	checkedCamera(second);
 	for (const auto& pose : {onRobot, secondOnFirst})
-		if (!pose.getHomogeneousMatrixVal<mrpt::math::CMatrixDouble44>()
-				 .asEigen()
-				 .allFinite())
+		if (!isFinite(pose))
 			throw Skipped(
 				TSkipReason::NO_CALIBRATION, "pose of a camera is not finite");
 }
@@ -169,11 +167,18 @@ bool CFrameMaker::isNew(const TCalibration& calibration) const
 
 void CFrameMaker::setUp(const CObservationStereoImages& obs)
 {
-	const auto left = checkedCamera(obs.leftCamera);
-	const auto right = checkedCamera(obs.rightCamera);
-	const auto T_left_right = toSE3(mrpt::poses::CPose3D(obs.rightCameraPose));
-	if (!(T_left_right.p.norm() > 0))
+	m_stereoRig = {
+		checkedCamera(obs.leftCamera), checkedCamera(obs.rightCamera),
+		toSE3(mrpt::poses::CPose3D(obs.rightCameraPose))};
+	if (!(m_stereoRig.T_left_right.p.norm() > 0))
 		throw Skipped(TSkipReason::NO_CALIBRATION, "stereo baseline is 0");
+	m_T_robot_cam = toSE3(mrpt::poses::CPose3D(obs.cameraPose));
+	if (m_images == TImages::IDEAL) rectify();
+}
+
+void CFrameMaker::rectify()
+{
+	const auto& [left, right, T_left_right] = m_stereoRig;
 	try
 	{
 		m_rectifier.emplace(left, right, T_left_right);
@@ -186,7 +191,7 @@ void CFrameMaker::setUp(const CObservationStereoImages& obs)
 	const ::sgf::SE3 T_left_rect{
 		Eigen::Quaterniond(m_rectifier->R_left_rect()).normalized(),
 		Eigen::Vector3d::Zero()};
-	m_T_robot_cam = toSE3(mrpt::poses::CPose3D(obs.cameraPose)) * T_left_rect;
+	m_T_robot_cam = m_T_robot_cam * T_left_rect;
 }
 
 TFrame CFrameMaker::make(const CObservationStereoImages& obs)
@@ -197,13 +202,15 @@ TFrame CFrameMaker::make(const CObservationStereoImages& obs)
 		obs.leftCamera, obs.rightCamera, mrpt::poses::CPose3D(obs.cameraPose),
 		mrpt::poses::CPose3D(obs.rightCameraPose)};
 	const bool first = isNew(calibration);
-	const cv::Mat left = greyOf(obs.imageLeft, obs.leftCamera);
-	const cv::Mat right = greyOf(obs.imageRight, obs.rightCamera);
-	if (first) setUp(obs);
-	m_calibration = calibration;
 	TFrame frame;
 	frame.time_ns = toNanoseconds(obs.timestamp);
-	std::tie(frame.grey, frame.right) = m_rectifier->Rectify(left, right);
+	frame.grey = greyOf(obs.imageLeft, obs.leftCamera);
+	frame.right = greyOf(obs.imageRight, obs.rightCamera);
+	if (first) setUp(obs);
+	m_calibration = calibration;
+	if (m_rectifier)
+		std::tie(frame.grey, frame.right) =
+			m_rectifier->Rectify(frame.grey, frame.right);
 	return frame;
 }
 

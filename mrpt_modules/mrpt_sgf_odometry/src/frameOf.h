@@ -17,6 +17,7 @@
 #include <opencv2/core.hpp>
 
 #include <sgf/core/se3.h>
+#include <sgf/flow/stereo_flow.h>
 #include <sgf/odometry/odometry.h>
 #include <sgf/odometry/rectification.h>
 
@@ -41,20 +42,31 @@ struct TFrame
 	cv::Mat1f depth;  //!< m; empty with stereo
 };
 
-/** Turns observations of one camera (pair) into frames: rectified, or free of
- * distortion. The first observation fixes the calibration. */
+/** Turns observations of one camera (pair) into frames. The first observation
+ * fixes the calibration. */
 class CFrameMaker
 {
  public:
+	/** Images are rectified, or free of distortion; stereo images may also
+	 * stay as they are. */
+	enum class TImages
+	{
+		IDEAL,
+		RAW
+	};
+	explicit CFrameMaker(TImages images = TImages::IDEAL) : m_images(images) {}
+
 	/** \exception Skipped for what cannot be used
 	 * @{ */
 	TFrame make(const mrpt::obs::CObservationStereoImages& obs);
 	TFrame make(const mrpt::obs::CObservation3DRangeScan& obs);
 	/** @} */
 
-	/** Camera of the frames; set after the first. */
+	/** Camera of ideal frames; set after the first. */
 	const ::sgf::odometry::Rig& rig() const { return m_rig; }
-	/** Pose of that camera on the robot; set after the first frame. */
+	/** Cameras of raw frames; set after the first. */
+	const ::sgf::flow::StereoRig& stereoRig() const { return m_stereoRig; }
+	/** Pose of the left or only camera on the robot; set after the first frame. */
 	const ::sgf::SE3& T_robot_cam() const { return m_T_robot_cam; }
 
  private:
@@ -69,12 +81,15 @@ class CFrameMaker
 	};
 	bool isNew(const TCalibration& calibration) const;
 	void setUp(const mrpt::obs::CObservationStereoImages& obs);
+	void rectify();
 	void setUp(const mrpt::obs::CObservation3DRangeScan& obs);
 
+	TImages m_images;
 	std::optional<TCalibration> m_calibration;
 	std::optional<::sgf::odometry::StereoRectifier> m_rectifier;
 	cv::Mat m_undistortX, m_undistortY;  // empty without distortion
 	::sgf::odometry::Rig m_rig;
+	::sgf::flow::StereoRig m_stereoRig;
 	::sgf::SE3 m_T_robot_cam;
 };
 

@@ -9,15 +9,23 @@
 #include <mrpt/config/CConfigFileBase.h>
 #include <mrpt/sgf/CSgfOdometry.h>
 
+#include <sgf/core/inertial.h>
 #include <sgf/odometry/odometry.h>
+#include <sgf/vio/stereo_inertial_odometry.h>
 
 namespace mrpt::sgf::internal
 {
-/** The odometry's options with those that the parameters name.
+/** An estimator's options with those that the parameters name.
  * \param where what errors call the parameters
- * \exception ::sgf::Error for an unknown name or a bad value */
+ * \exception ::sgf::Error for a bad value, or a name that no estimator knows
+ * @{ */
 ::sgf::odometry::OdometryOptions odometryOptions(
 	const CSgfOdometry::TParams& params, const std::string& where);
+::sgf::vio::VioOptions vioOptions(
+	const CSgfOdometry::TParams& params, const std::string& where);
+/** @} */
+
+::sgf::ImuNoise imuNoise(const CSgfOdometry::TParams& params);
 
 /** \exception std::exception naming file and section if it is not there */
 void requireSection(

@@ -2,6 +2,7 @@
 
 import numpy as np
 from PIL import Image
+from scipy.interpolate import CubicSpline
 
 SIZE = (240, 320)  # rows, columns
 FOCAL = 200.0  # px
@@ -74,6 +75,12 @@ def curve(frames):
     return np.stack([0.03 * i, 0.001 * i**2, 0.01 * i], 1)
 
 
+def slalom(frames):
+    """x, y, yaw of a lively drive from the origin, speeding up and braking."""
+    t = PERIOD_NS * 1e-9 * np.arange(frames)
+    return np.stack([0.5 * np.sin(1.5 * t), 0.2 * (1 - np.cos(2 * t)), 0.2 * np.sin(1.1 * t)], 1)
+
+
 def circle(frames, radius=1.2):
     """Once around, from the origin back to it."""
     angle = np.linspace(0, 2 * np.pi, frames)
@@ -117,6 +124,17 @@ def write_euroc(folder, path):
     return folder
 
 
+def _inertial_rows(path):
+    """Time, rates and accelerations of the robot, with gravity; none is at a frame's time."""
+    seconds = PERIOD_NS * 1e-9 * np.arange(len(path))
+    spline = CubicSpline(seconds, path)
+    for k in range(10 * len(path)):
+        offset_ns = 2_000_000 + k * PERIOD_NS // 10
+        t = min(offset_ns * 1e-9, seconds[-1])
+        x, y = yaw_matrix(spline(t)[2])[:2, :2].T @ spline(t, 2)[:2]
+        yield START_NS + offset_ns, 0, 0, spline(t, 1)[2], x, y, 9.81
+
+
 def _write_imu(folder, path):
     folder.mkdir()
     T = [float(v) for v in np.eye(4).ravel()]
@@ -125,11 +143,7 @@ def _write_imu(folder, path):
         "gyroscope_noise_density: 1.0e-4\ngyroscope_random_walk: 1.0e-5\n"
         "accelerometer_noise_density: 1.0e-3\naccelerometer_random_walk: 1.0e-3\n"
     )
-    stamps = times_ns(len(path))
-    rate = np.diff(path[:, 2]) / (PERIOD_NS * 1e-9)
-    rows = []
-    for k, stamp in enumerate(stamps[:-1]):
-        rows += [f"{stamp + s * PERIOD_NS // 10},0,0,{rate[k]},0,0,9.81\n" for s in range(10)]
+    rows = [",".join(map(str, row)) + "\n" for row in _inertial_rows(path)]
     (folder / "data.csv").write_text("#timestamp,wx,wy,wz,ax,ay,az\n" + "".join(rows))
 
 

@@ -7,15 +7,19 @@
 #pragma once
 
 #include <mrpt/obs/CObservation3DRangeScan.h>
+#include <mrpt/obs/CObservationIMU.h>
 #include <mrpt/obs/CObservationStereoImages.h>
 #include <mrpt/poses/CPose3D.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
 #include <Eigen/Core>
 
+#include <sgf/core/camera.h>
 #include <sgf/core/random.h>
+#include <sgf/core/se3.h>
 
 /** What a camera on a robot sees in a room with textured walls, for tests. */
 namespace mrpt::sgf::testing
@@ -96,19 +100,31 @@ class CRoom
 		return {depth, greyAt(origin + depth * ray)};
 	}
 
-	static mrpt::img::CImage image(const mrpt::poses::CPose3D& camera)
+	/** \param k1 distortion */
+	static mrpt::img::CImage image(
+		const mrpt::poses::CPose3D& camera, double k1 = 0)
 	{
+		const auto ideal = CRoom::camera();
+		::sgf::Camera bent{kColumns,   kRows,      kFocal, kFocal,
+						   ideal.cx(), ideal.cy(), k1};
 		mrpt::img::CImage out(kColumns, kRows, mrpt::img::CH_GRAY);
 		for (int y = 0; y < kRows; ++y)
 			for (int x = 0; x < kColumns; ++x)
+			{
+				const Eigen::Vector3d ray = bent.Unproject({x, y});
+				const THit hit = look(
+					camera, kFocal * ray.x() + ideal.cx(),
+					kFocal * ray.y() + ideal.cy());
 				*out.ptr<uint8_t>(x, y) =
-					static_cast<uint8_t>(std::lround(look(camera, x, y).grey));
+					static_cast<uint8_t>(std::lround(hit.grey));
+			}
 		return out;
 	}
 
-	/** Stereo images of a robot at a pose, rectified. */
+	/** Stereo images of a robot at a pose, by cameras side by side.
+	 * \param k1 their distortion */
 	static mrpt::obs::CObservationStereoImages::Ptr stereo(
-		const mrpt::poses::CPose3D& robot, double time_s)
+		const mrpt::poses::CPose3D& robot, double time_s, double k1 = 0)
 	{
 		auto obs = mrpt::obs::CObservationStereoImages::Create();
 		obs->timestamp = mrpt::Clock::fromDouble(time_s);
@@ -117,8 +133,11 @@ class CRoom
 		obs->cameraPose = mrpt::poses::CPose3DQuat(cameraPose());
 		const mrpt::poses::CPose3D onLeft(kBaseline, 0, 0, 0, 0, 0);
 		obs->rightCameraPose = mrpt::poses::CPose3DQuat(onLeft);
-		obs->imageLeft = image(robot + cameraPose());
-		obs->imageRight = image(robot + cameraPose() + onLeft);
+		if (k1 != 0)
+			for (auto* c : {&obs->leftCamera, &obs->rightCamera})
+				c->setDistortionPlumbBob(k1, 0, 0, 0);
+		obs->imageLeft = image(robot + cameraPose(), k1);
+		obs->imageRight = image(robot + cameraPose() + onLeft, k1);
 		obs->hasImageRight = true;
 		return obs;
 	}
@@ -151,6 +170,56 @@ class CRoom
 			0.03 * i, 0.01 * i * i * 0.1, 0, mrpt::DEG2RAD(0.6 * i), 0, 0);
 	}
 	static double time(int i) { return 1000 + 0.05 * i; }
+
+	/** Pose of a robot in lively flight, from the origin on.
+	 * \param s seconds since time(0) */
+	static mrpt::poses::CPose3D flight(double s)
+	{
+		return mrpt::poses::CPose3D(
+			0.3 * std::sin(1.5 * s), 0.2 * (1 - std::cos(2 * s)),
+			0.15 * std::sin(2.2 * s), 0.2 * std::sin(1.1 * s),
+			0.1 * std::sin(1.7 * s), 0.12 * std::sin(1.3 * s));
+	}
+
+	/** The inertial sensor on the robot: beside and turned. */
+	static mrpt::poses::CPose3D sensorPose()
+	{
+		return mrpt::poses::CPose3D(
+			-0.1, 0.05, 0.2, mrpt::DEG2RAD(30.0), mrpt::DEG2RAD(80.0), 0);
+	}
+
+	/** What an ideal inertial sensor says in flight, gravity being along -z. */
+	static mrpt::obs::CObservationIMU::Ptr imu(double s)
+	{
+		using namespace mrpt::obs;
+		constexpr double kStep_s = 1e-3;
+		const auto at = [](double t) { return flight(t) + sensorPose(); };
+		const auto rotation = [&](double t) {
+			return Eigen::Matrix3d(at(t).getRotationMatrix().asEigen());
+		};
+		const auto place = [&](double t)
+		{ return Eigen::Vector3d(at(t).x(), at(t).y(), at(t).z()); };
+		const Eigen::Matrix3d turn =
+			rotation(s - kStep_s).transpose() * rotation(s + kStep_s);
+		const Eigen::Vector3d rates =
+			::sgf::LogSO3(Eigen::Quaterniond(turn)) / (2 * kStep_s);
+		const Eigen::Vector3d moved =
+			place(s - kStep_s) - 2 * place(s) + place(s + kStep_s);
+		const Eigen::Vector3d accel =
+			rotation(s).transpose() * (moved / (kStep_s * kStep_s) +
+									   9.81 * Eigen::Vector3d::UnitZ());
+		auto obs = CObservationIMU::Create();
+		obs->timestamp = mrpt::Clock::fromDouble(time(0) + s);
+		obs->sensorLabel = "IMU";
+		obs->sensorPose = sensorPose();
+		for (int i = 0; i < 3; ++i)
+		{
+			obs->set(std::array{IMU_WX, IMU_WY, IMU_WZ}[i], rates[i]);
+			obs->set(
+				std::array{IMU_X_ACC, IMU_Y_ACC, IMU_Z_ACC}[i], accel[i]);
+		}
+		return obs;
+	}
 };
 
 }  // namespace mrpt::sgf::testing

@@ -15,10 +15,15 @@ namespace {
 constexpr int kRuns = 60, kFrames = 25;
 
 /// Normalised estimation errors squared, averaged over flights through rooms with all noise drawn
-/// anew: of the newest pose, its rotation, and its position.
+/// anew: of the newest pose, its parts, the velocity, and the motion since the frame before.
 struct Nees {
-  double pose = 0, rotation = 0, position = 0, velocity = 0;
+  double pose = 0, rotation = 0, position = 0, velocity = 0, motion = 0;
 };
+
+/// The later state's pose in coordinates of the earlier one.
+BodyState MotionOf(const BodyState& before, const BodyState& now) {
+  return {.time_ns = now.time_ns, .T_world_body = before.T_world_body.Inverse() * now.T_world_body};
+}
 
 /// @param states, keyframes of the window.
 Nees Measure(int states, int keyframes, const SimulatedWindow::Options& options) {
@@ -40,11 +45,17 @@ Nees Measure(int states, int keyframes, const SimulatedWindow::Options& options)
     }
     const Frame& newest = window.frames.back();
     const StateVector error = Minus(simulated.TruthOf(newest.id), newest.state);
-    const StateMatrix covariance = window.CovarianceOf(newest);
+    const FrameCovariance covariance = window.CovarianceOf(newest);
     const auto part = [&](int begin, int size) {
       const Eigen::VectorXd e = error.segment(begin, size);
-      return e.dot(covariance.block(begin, begin, size, size).ldlt().solve(e)) / kRuns;
+      return e.dot(covariance.state.block(begin, begin, size, size).ldlt().solve(e)) / kRuns;
     };
+    const Frame& before = *std::prev(window.frames.end(), 2);
+    const Eigen::VectorXd moved =
+        Minus(MotionOf(simulated.TruthOf(before.id), simulated.TruthOf(newest.id)),
+              MotionOf(before.state, newest.state))
+            .head<kPoseParameters>();
+    nees.motion += moved.dot(covariance.motion.ldlt().solve(moved)) / kRuns;
     nees.pose += part(kRotation, 6);
     nees.rotation += part(kRotation, 3);
     nees.position += part(kPosition, 3);
@@ -55,8 +66,9 @@ Nees Measure(int states, int keyframes, const SimulatedWindow::Options& options)
 
 void Report(const std::string& what, const Nees& nees) {
   std::printf(
-      "%s: NEES of the pose %.2f (6), rotation %.2f (3), position %.2f (3), velocity %.2f (3)\n",
-      what.c_str(), nees.pose, nees.rotation, nees.position, nees.velocity);
+      "%s: NEES of the pose %.2f (6), rotation %.2f (3), position %.2f (3), velocity %.2f (3), "
+      "motion %.2f (6)\n",
+      what.c_str(), nees.pose, nees.rotation, nees.position, nees.velocity, nees.motion);
   ::testing::Test::RecordProperty(what, std::to_string(nees.pose));
 }
 
@@ -80,6 +92,7 @@ TEST(Consistency, OfTheSlidingWindow) {
   ExpectConsistent(nees.rotation, 3);
   ExpectConsistent(nees.position, 3);
   ExpectConsistent(nees.velocity, 3);
+  ExpectConsistent(nees.motion, 6);
 }
 
 // What an odometry does that makes a landmark from its whole track, although what some of it said

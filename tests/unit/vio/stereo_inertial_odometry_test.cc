@@ -216,6 +216,22 @@ TEST(StereoInertialOdometry, UsesTheSensorFromWhenItComes) {
   EXPECT_LT((UpOf(last) - truth.T_world_body.R.conjugate() * Vector3d::UnitZ()).norm(), 0.03);
 }
 
+TEST(StereoInertialOdometry, GoesOnWithImagesAloneWhereTheGyroscopeIsInDegrees) {
+  Ridden flight;
+  int lost = 0;
+  for (int k = 0; k < 50; ++k) {
+    flight.Feed(k, [](ImuSample& sample) {
+      sample.gyro *= 57.3;
+      return true;
+    });
+    lost += flight.Look(k).state == VioState::kLost;
+  }
+  EXPECT_LE(lost, 1);
+  EXPECT_LT(MotionError(flight, 25, 49), 0.03);
+  EXPECT_FALSE(flight.results.back().inertial);
+  EXPECT_THAT(Explain(flight.results.back().problem), HasSubstr("the gyroscope"));
+}
+
 TEST(StereoInertialOdometry, GoesOnAfterAGapOfTheSensor) {
   Ridden flight;
   for (int k = 0; k < 58; ++k) {

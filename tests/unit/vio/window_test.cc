@@ -67,7 +67,7 @@ double NeesOf(const SimulatedWindow& simulated) {
     if (frame.id == 0) continue;
     const int size = frame.inertial ? kStateSize : kPoseParameters;
     const VectorXd d = Minus(frame.state, simulated.TruthOf(frame.id)).head(size);
-    const StateMatrix covariance = simulated.window.CovarianceOf(frame);
+    const StateMatrix covariance = simulated.window.CovarianceOf(frame).state;
     sum += d.dot(covariance.topLeftCorner(size, size).ldlt().solve(d)) / size;
   }
   return sum / (static_cast<double>(simulated.window.frames.size()) - 1);
@@ -148,7 +148,7 @@ TEST(Window, IsAtTheMinimumAfterTheDefaultsIterations) {
     }
   const Frame &a = patient.window.frames.back(), &b = quick.window.frames.back();
   const StateVector d = Minus(b.state, a.state);
-  EXPECT_LT(d.dot(patient.window.CovarianceOf(a).ldlt().solve(d)), 0.05);
+  EXPECT_LT(d.dot(patient.window.CovarianceOf(a).state.ldlt().solve(d)), 0.05);
 }
 
 TEST(Window, RecoversPosesWithoutInertialSensor) {
@@ -175,7 +175,7 @@ TEST(Window, AnchorsRotationsAboutTheAxesOfTheWorld) {
   sigmas.head<3>() << 0.1, 0.2, 1e-3;
   Frame& frame = simulated.window.frames[0];
   Anchor(frame, sigmas, simulated.window);
-  const StateMatrix covariance = simulated.window.CovarianceOf(frame);
+  const StateMatrix covariance = simulated.window.CovarianceOf(frame).state;
   const Eigen::Matrix3d R = frame.state.T_world_body.R.toRotationMatrix();
   const Eigen::Matrix3d world = R * covariance.topLeftCorner<3, 3>() * R.transpose();
   EXPECT_LT((world - Eigen::Matrix3d(Vector3d(1e-2, 4e-2, 1e-6).asDiagonal())).norm(), 1e-6);
@@ -257,11 +257,11 @@ TEST(Window, KeepsWhatMarginalizedFramesSaid) {
     for (const LandmarkSight& sight : landmark.sights) EXPECT_NE(sight.frame, 0);
   }
   const Frame &a = batch.window.frames.back(), &b = sliding.window.frames.back();
-  const StateMatrix covariance = batch.window.CovarianceOf(a);
+  const StateMatrix covariance = batch.window.CovarianceOf(a).state;
   const StateVector d = Minus(b.state, a.state);
   // In deviations of the batch's estimate: nearly nothing.
   EXPECT_LT(d.dot(covariance.ldlt().solve(d)), 0.1);
-  const StateMatrix left = sliding.window.CovarianceOf(b);
+  const StateMatrix left = sliding.window.CovarianceOf(b).state;
   for (int k = 0; k < kStateSize; ++k)
     EXPECT_NEAR(std::sqrt(left(k, k) / covariance(k, k)), 1, 0.05) << k;
 }
@@ -276,7 +276,7 @@ TEST(Window, ForgetsNoUncertaintyThroughManyMarginalizations) {
     window.Refine();
     window.RemoveOutliers();
     simulated.Marginalize(3, 3);
-    const StateMatrix covariance = window.CovarianceOf(window.frames.back());
+    const StateMatrix covariance = window.CovarianceOf(window.frames.back()).state;
     EXPECT_TRUE(covariance.allFinite());
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<StateMatrix>(covariance).eigenvalues()(0), 0) << k;
     EXPECT_LT((covariance - covariance.transpose()).norm(), 1e-9 * covariance.norm());

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <array>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -68,6 +69,18 @@ class CSgfLoopClosureERD
 		if (source.sectionExists("SgfOdometry"))
 			odometry.loadFromConfigFile(source, "SgfOdometry");
 		m_aligner = std::make_unique<CSgfPairAligner>(odometry);
+		m_framesKept = static_cast<size_t>(odometry.max_waiting_frames) + 1;
+	}
+
+	/** By what time a node has, its frame is found where nodes come later than
+	 * their frames, as with TEstimator::STEREO_INERTIAL. Without it the frame
+	 * at hand is taken for that of a new node.
+	 * \param times such as CSgfOdometryNRD::nodeTimes(); they have to live as
+	 * long as this object is used */
+	void setNodeTimes(
+		const std::map<mrpt::graphs::TNodeID, mrpt::Clock::time_point>& times)
+	{
+		m_nodeTimes = &times;
 	}
 
 	/** Looks for loops if there is a new node; to be called with the same
@@ -80,7 +93,7 @@ class CSgfLoopClosureERD
 	{
 		this->m_just_inserted_lc = false;
 		forEachObservation(
-			observations, observation, [this](const auto& obs) { take(*obs); });
+			observations, observation, [this](const auto& obs) { take(obs); });
 		return true;
 	}
 
@@ -163,14 +176,31 @@ class CSgfLoopClosureERD
 		return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0));
 	}
 
-	// The frame that the node decider has just made a node of. The root is
-	// registered with the first node after it, but stands for the first frame.
-	void take(const mrpt::obs::CObservation& obs)
+	// The frame that the node decider has made a node of; empty if it is not
+	// known.
+	mrpt::obs::CObservation::Ptr frameOf(TNodeID node) const
 	{
+		if (!m_nodeTimes) return m_frames.back();
+		const auto time = m_nodeTimes->find(node);
+		if (time == m_nodeTimes->end()) return {};
+		for (const auto& frame : m_frames)
+			if (frame->timestamp == time->second) return frame;
+		return {};
+	}
+
+	// Looks at the newest node. The root is registered with the first node
+	// after it, but stands for the first frame.
+	void take(const mrpt::obs::CObservation::Ptr& obs)
+	{
+		const bool isFrame = CSgfPairAligner::isFrame(*obs);
+		if (isFrame) m_frames.push_back(obs);
+		if (m_frames.size() > m_framesKept) m_frames.pop_front();
 		const size_t count = this->m_graph->nodeCount();
 		const TNodeID node = count == 0 ? 0 : count - 1;
-		if (m_views.count(node) || !CSgfPairAligner::isFrame(obs)) return;
-		const View view = m_aligner->makeView(obs);
+		if (m_views.count(node) || !(isFrame || m_nodeTimes)) return;
+		const auto frame = frameOf(node);
+		if (!frame) return;
+		const View view = m_aligner->makeView(*frame);
 		if (view || count > 0) m_views[node] = view;
 		if (!view) return;
 		for (const TNodeID old : candidates(node)) tryToClose(old, node);
@@ -243,6 +273,9 @@ class CSgfLoopClosureERD
 	}
 
 	std::unique_ptr<CSgfPairAligner> m_aligner;
+	std::deque<mrpt::obs::CObservation::Ptr> m_frames;  // the newest ones
+	size_t m_framesKept = 1;
+	const std::map<TNodeID, mrpt::Clock::time_point>* m_nodeTimes = nullptr;
 	std::map<TNodeID, View> m_views;  // empty where there was none to be had
 	int m_closures = 0;
 };
