@@ -26,11 +26,11 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --sanitize      test: only the C++ unit tests, under the address and undefined-behaviour sanitizers
   --full          render the full suite of eleven sequences (15 GB at most) instead of the short one
                   of four (2 GB at most)
-  --runs N        runs of each line of the tables that repeat runs (odometry, table3, table3_vio);
+  --runs N        runs of each line of the tables that repeat runs (odometry, table3);
                   default: a few, for a quick look; rankings take 10, shares of success 25
   --jobs N        parallel jobs; default: the number of processors
   --list          list the experiments and stop
-  --clean         remove what was built and generated (not results/reference) and stop
+  --clean         remove what was built and generated (not results/reference and results/external) and stop
   --help          show this text and stop
 
 Results: results/tables, results/figures; logs: results/logs. What is up to date is not made again,
@@ -186,8 +186,8 @@ mrpt_programs() {
 
 clean() {
   rm -rf build/release build/sanitize datasets/generated
-  find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + 2>/dev/null || true
-  echo "Removed build/release, build/sanitize, datasets/generated and all of results but results/reference."
+  find results -mindepth 1 -maxdepth 1 ! -name reference ! -name external -exec rm -rf {} + 2>/dev/null || true
+  echo "Removed build/release, build/sanitize, datasets/generated and all of results but reference and external."
 }
 
 run_experiments() {

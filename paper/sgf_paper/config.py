@@ -580,10 +580,21 @@ class TableSequence(TrackedSequence):
     most_images: int = 0  # 0: no limit
     published: str = ""  # its column in the published table
 
+    @property
+    def dataset(self) -> str:
+        if self.rendered:
+            return "synthetic"
+        return "euroc_slice" if self.most_images else "euroc"
+
+    @property
+    def euroc_name(self) -> str:
+        """EuRoC's name of it, which a rendered one and a cut share with the original."""
+        return Path(self.folder).name
+
     def at_hand(self, data: str) -> bool:
         if self.rendered or not super().at_hand(data):
             return self.rendered
-        images = count_images(self.path(Path(), data))
+        images = len(image_times_ns(self.path(Path(), data)))
         return images >= self.least_images and not 0 < self.most_images < images
 
 
@@ -616,6 +627,8 @@ class TrajectoryTable(RepeatedRuns):
     SCORES_OWN = True
 
     fail_above_pct: float  # ATE RMSE over the length of the path
+    verdict_runs: int  # fewer give no verdict
+    margin_pct: float
     published: str
     programs: dict[str, TrackingProgram]
 
@@ -635,6 +648,35 @@ class TrajectoryTable(RepeatedRuns):
     def score_flags(self, column: str) -> list[str]:
         program = self.programs[self.program(column)]
         return _command_line({"frame": program.frame, "align": program.align})
+
+
+@dataclass(frozen=True)
+class ExternalSystem:
+    """How the trajectories of another system are scored."""
+
+    frame: str = "body"  # that its poses are of: body or camera
+    align: str = "se3"  # or sim3 where its scale is not known
+
+
+@dataclass
+class JoinedTable:
+    """Trajectory tables side by side, with the paper's rows and the trajectories of other systems."""
+
+    kind: str
+    name: str
+    title: str
+    parts: dict[str, TrajectoryTable]  # by what names of their systems begin with; by name in the file
+    published: list[str]  # rows of the paper's table that are systems of their own
+
+    @property
+    def sequences(self) -> list[TableSequence]:
+        """Those of all parts, each once."""
+        return list(dict.fromkeys(s for part in self.parts.values() for s in part.sequences.values()))
+
+    @property
+    def rule(self) -> TrajectoryTable:
+        """The part that says what is lost and what has failed: all say the same."""
+        return next(iter(self.parts.values()))
 
 
 @dataclass
@@ -676,7 +718,7 @@ class Sequences:
 
 Experiment = Union[
     ContactSheet, Convergence, Sequences, Table, Density, DirectMap, LightChange, DisparityFigure, Benchmark,
-    MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
+    JoinedTable, MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
 ]
 
 
@@ -847,6 +889,20 @@ def _build_trajectory_table(node: dict[str, Any], where: str) -> TrajectoryTable
     return study
 
 
+def _build_joined_table(node: dict[str, Any], where: str) -> JoinedTable:
+    joined = _build(JoinedTable, node, where)
+    joined.parts = {prefix: load_experiment(name) for prefix, name in joined.parts.items()}
+    for part in joined.parts.values():
+        if part.kind != "trajectory_table":
+            raise ConfigError(f"{where}: parts: {part.name} is no trajectory_table")
+        for key in ("lost_below_pct", "fail_above_pct", "published"):
+            if getattr(part, key) != getattr(joined.rule, key):
+                raise ConfigError(f"{where}: parts: {key} of {part.name} differs from that of {joined.rule.name}")
+    if unknown := set(joined.published) - set(load_published_rows(joined.rule)):
+        raise ConfigError(f"{where}: published: the paper has no row {sorted(unknown)}")
+    return joined
+
+
 BUILDERS = {
     "benchmark": partial(_build, Benchmark),
     "contact_sheet": partial(_build, ContactSheet),
@@ -854,6 +910,7 @@ BUILDERS = {
     "density": partial(_build, Density),
     "direct_map": _build_direct_map,
     "disparity_figure": _build_figure,
+    "joined_table": _build_joined_table,
     "light_change": _build_light_change,
     "mrpt_map": partial(_build_on_sequences, MrptMap),
     "odometry": _build_odometry,
@@ -915,21 +972,38 @@ def load_published_trajectories(table: TrajectoryTable) -> dict[str, dict[str, f
 
     Columns that are not in the paper have none. The average `avg` is as printed.
     """
-    entry = _published_entry(table.published)
-    if unknown := {column.published for column in table.columns.values()} - {"", *entry}:
+    rows = load_published_rows(table)
+    if unknown := {column.published for column in table.columns.values()} - {"", *rows}:
         raise ConfigError(f"{PUBLISHED}: no entry {table.published}.{sorted(unknown)}")
-    return {
-        name: dict(zip(entry["columns"], entry[column.published])) if column.published else {}
-        for name, column in table.columns.items()
-    }
+    return {name: rows.get(column.published, {}) for name, column in table.columns.items()}
 
 
-def count_images(sequence: Path) -> int:
-    """Images in the list of a sequence in EuRoC's layout; 0 without one."""
+def load_published_rows(table: TrajectoryTable) -> dict[str, dict[str, float]]:
+    """The paper's ATE (m) of all rows of the table, as load_published_trajectories() has them."""
+    entry = dict(_published_entry(table.published))
+    names = entry.pop("columns")
+    return {row: dict(zip(names, values)) for row, values in entry.items()}
+
+
+def load_external_system(folder: Path) -> ExternalSystem:
+    """How the trajectories of a folder are scored: as its align.yaml says, if it has one."""
+    path = folder / "align.yaml"
+    if not path.exists():
+        return ExternalSystem()
+    system = _build(ExternalSystem, read_yaml(path), str(path))
+    for key, known in {"frame": ("body", "camera"), "align": ("se3", "sim3")}.items():
+        if getattr(system, key) not in known:
+            raise ConfigError(f"{path}: {key} is {getattr(system, key)!r}; known: {', '.join(known)}")
+    return system
+
+
+def image_times_ns(sequence: Path) -> list[int]:
+    """Times in the list of images of a sequence in EuRoC's layout; none without one."""
     listing = sequence / "mav0" / "cam0" / "data.csv"
     if not listing.exists():
-        return 0
-    return sum(1 for line in listing.read_text().splitlines() if line and not line.startswith("#"))
+        return []
+    lines = listing.read_text().splitlines()
+    return [int(line.split(",")[0]) for line in lines if line and not line.startswith("#")]
 
 
 def dataset_flags(data: str, generated: str) -> list[str]:

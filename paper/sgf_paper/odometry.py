@@ -167,13 +167,6 @@ def make_blocks(table: pd.DataFrame) -> list[dict]:
     ]
 
 
-def _compared_rows(compared: pd.DataFrame) -> list[dict]:
-    return [
-        {**line._asdict(), "ratio": text.format_estimate(line.ratio, line.ratio_low, line.ratio_high, 2)}
-        for line in compared.itertuples()
-    ]
-
-
 def make_odometry(
     name: str, raw: Path, sequences: list[str], runs: int, tables: Path, figures: Path
 ) -> None:
@@ -187,7 +180,7 @@ def make_odometry(
         "odometry.md.j2",
         **repeated_runs.document_context(study, sequences, runs),
         blocks=make_blocks(table),
-        compared=_compared_rows(compared),
+        compared=repeated_runs.ratio_rows(compared),
     )
     (tables / f"{name}.md").write_text(document)
     style.save(draw(study, lines), figures, name)

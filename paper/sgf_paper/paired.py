@@ -105,3 +105,38 @@ def compare_success(
     return SuccessDifference(
         a.size, int((a & b).sum()), only_own, only_baseline, difference_pct, low, high, float(p)
     )
+
+
+def estimate_ratio(
+    own: Sequence[float], of_baseline: Sequence[float], clusters: Sequence[Hashable]
+) -> Estimate:
+    """The median ratio of errors, pair by pair; pairs of runs that are both lost have nothing to say.
+
+    A run that alone is lost is infinitely worse: that counts in the median as any ratio on its side of it.
+    Medians are taken of logarithms, so that the two may change places.
+    @param clusters as for compare_success(); the estimate's `runs` are those that are left.
+    """
+    ratio = np.asarray(ratios(own, of_baseline))
+    known = ~np.isnan(ratio)
+    if not known.any():
+        return estimate_median([])
+    with np.errstate(divide="ignore"):
+        logs = np.log(ratio[known])
+    codes, left = pd.factorize(pd.Series(list(clusters))[known])
+    order = np.argsort(logs)
+    drawn = _resample(len(left))
+    times = np.stack([(drawn == cluster).sum(axis=1) for cluster in range(len(left))], axis=1)
+    medians = np.exp(_weighted_medians(logs[order], times[:, codes[order]]))
+    low, high = quantiles(medians, ENDS)
+    middle = np.exp(_weighted_medians(logs[order], np.ones((1, logs.size), dtype=int)))
+    return Estimate(float(middle[0]), low, high, len(left))
+
+
+def _weighted_medians(ordered: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """The median of values, each taken as often as a line of `counts` says; 0 between −∞ and ∞."""
+    up_to = 2 * counts.cumsum(axis=1)
+    total = counts.sum(axis=1, keepdims=True)
+    lower, upper = ordered[(up_to >= total).argmax(axis=1)], ordered[(up_to > total).argmax(axis=1)]
+    with np.errstate(invalid="ignore"):
+        middle = (lower + upper) / 2
+    return np.where(np.isnan(middle), 0, middle)

@@ -35,6 +35,14 @@ def posed_pct(lines: pd.DataFrame) -> pd.Series:
     return 100 * lines["posed"] / lines["frames"]
 
 
+def ratio_rows(compared: pd.DataFrame) -> list[dict]:
+    """Comparisons of errors as text."""
+    return [
+        {**line._asdict(), "ratio": text.format_estimate(line.ratio, line.ratio_low, line.ratio_high, 2)}
+        for line in compared.itertuples()
+    ]
+
+
 def document_context(study: RepeatedRuns, sequences: list[str], runs: int) -> dict[str, Any]:
     """What the templates of all reports need. @param sequences names of those that were run."""
     return {

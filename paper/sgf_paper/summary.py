@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from sgf_paper import bench, config, text
+from sgf_paper import bench, config, text, trajectory_table
 from sgf_paper.config import Dataset, Experiment
 
 FILES = {
@@ -14,6 +14,7 @@ FILES = {
     "density": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _equal.csv)",
     "direct_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "disparity_figure": "figures/{}.png (.pdf)",
+    "joined_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _light.csv, _timings.csv)",
     "light_change": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "benchmark": "tables/{}.md (.csv)",
     "contact_sheet": "figures/{}.png (.pdf)",
@@ -24,13 +25,14 @@ FILES = {
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
     "shift_profile": "figures/{0}.png (.pdf), tables/{0}.csv (_minima.csv)",
-    "trajectory_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _compared.csv, _runs.csv)",
+    "trajectory_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _compared.csv, _ate_compared.csv, _runs.csv)",
 }
 MAIN_FILE = {
     "table": "tables/{}.csv",
     "density": "figures/{}.png",
     "direct_map": "tables/{}.csv",
     "disparity_figure": "figures/{}.png",
+    "joined_table": "tables/{}.csv",
     "light_change": "tables/{}.csv",
     "benchmark": "tables/{}.csv",
     "contact_sheet": "figures/{}.png",
@@ -183,7 +185,26 @@ def _trajectory_table_lines(path: Path) -> list[str]:
         f" difference {row.difference_pct:+.0f} [{row.low_pct:+.0f}, {row.high_pct:+.0f}] %, p = {row.p:.2g}"
         for row in compared.itertuples()
     ]
+    errors = pd.read_csv(path.with_name(f"{path.stem}_ate_compared.csv"))
+    lines += [
+        f"{row.condition}, ATE of {row.column} over that of {row.baseline}, {row.pairs} pairs of runs:"
+        f" {text.format_estimate(row.ratio, row.ratio_low, row.ratio_high, 2)}, {row.verdict}"
+        for row in errors[errors["sequence"] == trajectory_table.ALL].itertuples()
+    ]
     return lines + _odometry_lines(path, "failed")
+
+
+def _joined_table_lines(path: Path) -> list[str]:
+    """Per data set the systems by their measured ATE, the mean over its sequences, as far as all have one."""
+    frame = pd.read_csv(path)
+    lines = []
+    measured = frame[(frame["quantity"] == "ate_mean_m") & (frame["runs"] > 0)]
+    for dataset, rows in measured.groupby("dataset", sort=False):
+        wide = rows.pivot(index="system", columns="sequence", values="measured")
+        means = 1000 * wide.mean(axis=1, skipna=False).dropna().sort_values(kind="stable")
+        texts = [f"{system} {mean:.1f}" for system, mean in means.items()]
+        lines.append(f"{dataset}, sequences: {wide.shape[1]}, mean ATE mm: {', '.join(texts)}")
+    return lines
 
 
 def _measured(stage: Experiment, results: Path) -> list[str]:
@@ -199,6 +220,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _convergence_lines(main_file(stage, results), stage.table_start["px"])
     if stage.kind == "direct_map":
         return _direct_map_lines(main_file(stage, results))
+    if stage.kind == "joined_table":
+        return _joined_table_lines(main_file(stage, results))
     if stage.kind == "mrpt_map":
         return _mrpt_map_lines(main_file(stage, results))
     if stage.kind == "odometry":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,11 @@ LINE = [
     "ate_mm", "ate_low_mm", "ate_high_mm", "ate_q75_mm", "ate_q90_mm",
     "ate_mean_mm", "ate_mean_low_mm", "ate_mean_high_mm", "ate_mean_of_successes_mm", "published_mm",
     "rpe_one_second_mm", "rpe_one_second_deg", "orientation_deg",
+]  # fmt: skip
+ALL = "all"  # sequences together
+COMPARED_ERRORS = [
+    "sequence", "condition", "column", "baseline", "pairs", "both_failed", "ratio", "ratio_low", "ratio_high",
+    "verdict",
 ]  # fmt: skip
 NAN = float("nan")
 
@@ -104,33 +109,61 @@ def compare(study: TrajectoryTable, runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(lines)
 
 
-def _draw_panel(
-    axis: plt.Axes, study: TrajectoryTable, runs: pd.DataFrame, limits: tuple[float, float]
+def compare_errors(study: TrajectoryTable, runs: pd.DataFrame) -> pd.DataFrame:
+    """ATE RMSE of the compared columns over the baselines', pair by pair: all sequences, then each."""
+    together = runs.assign(sequence=ALL, cluster=runs["sequence"])
+    every = pd.concat([together, runs.assign(cluster=runs["sequence"])])
+    lines = []
+    for (condition, sequence), own in every.groupby(["condition", "sequence"], sort=False):
+        wide = own.pivot(index=["cluster", "first_frame", "run"], columns="column", values="ate_mm")
+        clusters = [(cluster, first_frame) for cluster, first_frame, _ in wide.index]
+        for column, baseline in study.comparisons:
+            ratio = paired.estimate_ratio(wide[column], wide[baseline], clusters)
+            judged = replace(ratio, runs=min(ratio.runs, own["run"].nunique()))
+            values = (
+                sequence, condition, column, baseline, len(wide),
+                np.isinf(wide[[column, baseline]]).all(axis=1).sum(), ratio.median, ratio.low, ratio.high,
+                paired.verdict(judged, study.verdict_runs, study.margin_pct),
+            )  # fmt: skip
+            lines.append(dict(zip(COMPARED_ERRORS, values)))
+    return pd.DataFrame(lines, columns=COMPARED_ERRORS)
+
+
+def draw_curves(
+    axis: plt.Axes, runs: pd.DataFrame, limits: tuple[float, float], by: str, styles: dict[str, dict]
 ) -> None:
-    """A curve per column: the share of its runs with an error below x."""
-    extra = [column for column in study.columns if column not in style.COLOURS]
-    for column, own in runs.groupby("column", sort=False):
-        reached = np.sort(own.loc[~own["failed"], "ate_mm"])
+    """A curve for each value of column `by`: the share of its runs with an error below x."""
+    for label, own in runs.groupby(by, sort=False):
+        reached = np.sort(own.loc[~own["failed"], "ate_mm"]).clip(limits[0])
         shares = 100 * np.arange(reached.size + 1) / len(own)
         axis.step(
-            [limits[0], *reached, limits[1]], [*shares, shares[-1]], where="post", label=column,
-            **style.line_style(column, extra),
-        )  # fmt: skip
+            [limits[0], *reached, limits[1]], [*shares, shares[-1]], where="post", label=label, **styles[label]
+        )
     axis.set_xscale("log")
     axis.set(xlim=limits, ylim=(0, 103), xlabel="ATE RMSE, mm")
     style.label_decades(axis.xaxis)
     axis.grid(which="major", alpha=0.3, linewidth=0.5)
 
 
+def error_limits(runs: pd.DataFrame) -> tuple[float, float]:
+    """Where the axis of errors begins and ends: three decades at most."""
+    reached = runs.loc[~runs["failed"], "ate_mm"]
+    if reached.empty:
+        return 1, 10
+    last = 1.25 * reached.max()
+    return max(0.8 * reached.min(), last / 1000), last
+
+
 def draw(study: TrajectoryTable, runs: pd.DataFrame) -> plt.Figure:
     """How many runs stay below an error, a panel per condition, all its sequences together."""
-    reached = runs.loc[~runs["failed"], "ate_mm"]
-    limits = (1, 10) if reached.empty else (0.8 * reached.min(), 1.25 * reached.max())
+    limits = error_limits(runs)
+    extra = [column for column in study.columns if column not in style.COLOURS]
+    styles = {column: style.line_style(column, extra) for column in study.columns}
     conditions = list(runs["condition"].unique())
     drawing, axes = plt.subplots(1, len(conditions), figsize=(1 + 3.6 * len(conditions), 3.4), squeeze=False)
     for axis, condition in zip(axes[0], conditions):
         own = runs[runs["condition"] == condition]
-        _draw_panel(axis, study, own, limits)
+        draw_curves(axis, own, limits, "column", styles)
         counts = own["sequence"].nunique(), len(own.drop_duplicates(["sequence", "run"]))
         axis.set_title("{} (sequences: {}, runs of each column: {})".format(condition, *counts))
     axes[0, 0].set_ylabel("runs with a smaller error, %")
@@ -174,45 +207,20 @@ def compared_rows(compared: pd.DataFrame) -> list[dict]:
     ]
 
 
-def _cell(measured: float, published: float) -> str:
-    """ATE in m as in the paper, which is in brackets where it has one."""
-    shown = text.format_number(measured, 3) or "–"
-    return shown if published != published else f"{shown} ({published:.3f})"
-
-
-def paper_grid(study: TrajectoryTable, table: pd.DataFrame) -> dict[str, list]:
-    """The paper's Table III: its sequences and their average, and of each column the ATE in m as text.
-
-    Measured is the mean over the frames and then over the runs that succeed; a sequence outside the
-    paper's table has no part in the average.
-    """
-    published = config.load_published_trajectories(study)
-    names = {sequence.published: name for name, sequence in study.sequences.items() if sequence.published}
-    averaged = [label for label in names if any(label in values for values in published.values())]
-    own = table[table["condition"] == study.undisturbed].set_index(["column", "sequence"])
-    errors = own["ate_mean_of_successes_mm"]
-    rows = []
-    for column, values in published.items():
-        measured = {label: errors.get((column, name), NAN) / 1000 for label, name in names.items()}
-        measured["avg"] = np.mean([measured[label] for label in averaged])  # none without all of them
-        cells = [_cell(error, values.get(label, NAN)) for label, error in measured.items()]
-        rows.append({"column": column, "published": study.columns[column].published, "cells": cells})
-    return {"labels": [*names, "avg"], "rows": rows}
-
-
 def make_trajectory_table(
     name: str, raw: Path, sequences: list[str], runs: int, tables: Path, figures: Path
 ) -> None:
-    """Makes <name>.csv, _compared.csv, _runs.csv, .md, .tex and the figure."""
+    """Makes <name>.csv, _compared.csv, _ate_compared.csv, _runs.csv, .md, .tex and the figure."""
     study = config.load_experiment(name)
     lines = read_runs(study, raw, sequences, runs)
-    table, compared = make_table(study, lines), compare(study, lines)
-    repeated_runs.write_csvs(name, tables, {"": table, "_compared": compared, "_runs": lines})
+    table, compared, errors = make_table(study, lines), compare(study, lines), compare_errors(study, lines)
+    frames = {"": table, "_compared": compared, "_ate_compared": errors, "_runs": lines}
+    repeated_runs.write_csvs(name, tables, frames)
     context = {
         **repeated_runs.document_context(study, sequences, runs),
         "blocks": make_blocks(table),
         "compared": compared_rows(compared),
-        "grid": paper_grid(study, table),
+        "compared_errors": repeated_runs.ratio_rows(errors),
     }
     for extension in ("md", "tex"):
         document = text.render(f"trajectory_table.{extension}.j2", **context)

@@ -77,7 +77,7 @@ class Project:
             drop_extra_columns(sweep)
         experiments = self.root / "paper" / "experiments"
         shorten_runs(experiments / "odometry.yaml", "V1_03_difficult")
-        for name in ("odometry_parts", "table3"):
+        for name in ("odometry_parts", "table3_dso"):
             shorten_runs(experiments / f"{name}.yaml", "MH_03_medium")
         shorten_runs(experiments / "table3_vio.yaml", "MH_03_medium", "lssd")
         light_change = experiments / "light_change.yaml"

@@ -13,9 +13,10 @@ COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_co
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 ODOMETRY = ["odometry", "odometry_parts"]
-TRACKED = [*ODOMETRY, "table3", "table3_vio"]
+PARTS = ["table3_dso", "table3_vio"]
+TRACKED = [*ODOMETRY, *PARTS]
 # These need no data set.
-RENDERED = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "scenes", "sequences"]
+RENDERED = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "table3", "scenes", "sequences"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -28,7 +29,8 @@ FILES = {
     + ["fig1.csv", "fig1_curves.csv", "fig1.md", "fig2.csv", "fig2_minima.csv"]
     + ["convergence.csv", "convergence.md", "fig6.csv", "fig6.md", "mrpt_map.csv", "mrpt_map.md"]
     + [f"{name}{end}" for name in TRACKED for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
-    + ["table3.tex", "table3_vio.tex"]
+    + [f"{name}{end}" for name in PARTS for end in ("_ate_compared.csv", ".tex")]
+    + [f"table3{end}" for end in (".csv", "_light.csv", "_timings.csv", ".md", ".tex")]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
@@ -64,6 +66,7 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     assert "motorcycle_741x500: sgf_sgm 1.20 times cv::StereoSGBM (avx3, 1 thread)" in summary
     assert "light, converged from 2 px, %: photo 90, lssd 89, gn 88, sgf" in summary
     assert "V1_03_difficult, light, median ATE mm: sgf 1.0, photo inf (1/1 lost)" in summary
+    assert "synthetic, sequences: 1, mean ATE mm: dso_photo 1.0, dso_sgf 1.0, vio_lssd 1.0, vio_sgf 1.0" in summary
     assert "light, success by scale rule, 1 pairs of runs: sgf 1, photo 0, difference +100" in summary
     assert "MH_03_medium, light, median ATE mm: sgf 1.0, photo inf (1/1 failed)" in summary
     assert "living_room noise_free, mean px: photo 1.00, ugf 2.00" in summary
@@ -264,7 +267,7 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
     "command, log, lost",
     [
         ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
-        ("sequence", "sequences_run.log", ["fig6", "mrpt_map", *TRACKED, "sequences"]),
+        ("sequence", "sequences_run.log", ["fig6", "mrpt_map", *TRACKED, "table3", "sequences"]),
     ],
 )
 def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):
@@ -305,7 +308,6 @@ def test_a_downloaded_sequence_joins_the_rendered_one(project):
     before = (raw / "V1_02_medium" / "map.tum").stat().st_mtime_ns
     rendered = project.root / "datasets" / "generated" / "sequences" / "MH_01_easy"
     shutil.copytree(rendered, project.data / "euroc" / "MH_01_easy")
-    (project.data / "euroc" / "MH_01_easy" / "mav0" / "cam0" / "data.csv").touch()
     code, output = project.run("--only", "mrpt_map", "--data", str(project.data))
     assert code == 0, output
     table = rows(project.results / "tables" / "mrpt_map.csv")
@@ -318,7 +320,6 @@ def test_the_surface_of_a_downloaded_sequence_is_not_known(project):
     rendered = project.root / "datasets" / "generated" / "sequences" / "MH_01_easy"
     assert project.run("--only", "fig6")[0] == 0
     shutil.copytree(rendered, project.data / "euroc" / "MH_01_easy")
-    (project.data / "euroc" / "MH_01_easy" / "mav0" / "cam0" / "data.csv").touch()
     code, output = project.run("--only", "fig6", "--data", str(project.data))
     assert code == 0, output
     table = rows(project.results / "tables" / "fig6.csv")
@@ -382,13 +383,13 @@ def test_table_3_takes_the_calibration_of_what_is_rendered_and_tells_cuts_from_t
         camera = folder / "mav0" / "cam0"
         camera.mkdir(parents=True)
         (camera / "data.csv").write_text("#timestamp [ns],filename\n" + "1,1.png\n" * images)
-    code, output = project.run("--only", "table3", "--data", str(project.data))
+    code, output = project.run("--only", "table3_dso", "--data", str(project.data))
     assert code == 0, output
     assert sorted(project.trackings()) == sorted(
         [f"MH_03_medium {residual} 1{note}" for residual in ("photo", "sgf") for note in ("", " calibrated")]
         + [f"{folder.name} {residual} 1" for folder in (cut, whole) for residual in ("photo", "sgf")]
     )
-    table = rows(project.results / "tables" / "table3.csv")
+    table = rows(project.results / "tables" / "table3_dso.csv")
     assert [(row["sequence"], row["condition"], row["column"], row["published_mm"]) for row in table] == [
         ("MH_03_medium", "undisturbed", "sgf", ""),
         ("MH_03_medium", "undisturbed", "photo", ""),
@@ -399,4 +400,52 @@ def test_table_3_takes_the_calibration_of_what_is_rendered_and_tells_cuts_from_t
         ("euroc_MH_02", "undisturbed", "sgf", "50.0000"),
         ("euroc_MH_02", "undisturbed", "photo", "45.0000"),
     ]
-    assert not list((project.results / "raw" / "table3").rglob("*.ply")), "maps are large"
+    assert not list((project.results / "raw" / "table3_dso").rglob("*.ply")), "maps are large"
+
+
+def write_external(project, name, line):
+    path = project.results / "external" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(line + "\n")
+
+
+def table3_values(project, system):
+    """What table 3 has of a system by sequence, error and success."""
+    table = rows(project.results / "tables" / "table3.csv")
+    kept = [row for row in table if row["system"] == system and row["quantity"] in ("ate_mean_m", "success_pct")]
+    return [(row["sequence"], row["measured"], row["runs"]) for row in kept]
+
+
+def test_table_3_makes_its_parts_and_takes_in_other_systems(project):
+    write_external(project, "my slam/MH_03_medium.txt", "1400000000.1 0 0 0 0 0 0 1")
+    write_external(project, "my slam/MH_04_difficult.txt", "1400000000.1 0 0 0 0 0 0 1")
+    code, output = project.run("--only", "table3")
+    assert code == 0, output
+    for name in PARTS:
+        assert (project.results / "tables" / f"{name}.md").exists()
+    runs = len(project.trackings())
+    scored = [("MH_03_medium", "0.001000", "1"), ("MH_03_medium", "100.00", "1")]
+    assert table3_values(project, "my slam") == table3_values(project, "vio_sgf")[-2:] == scored
+    assert "not at hand: my slam/MH_04_difficult." in (project.results / "tables" / "table3.md").read_text()
+    write_external(project, "other/MH_03_medium.csv", "1400000000100000000,0,0,0,1,0,0,0")
+    assert project.run("--only", "table3")[0] == 0
+    assert table3_values(project, "other") == scored and len(project.trackings()) == runs
+    shutil.rmtree(project.results / "external" / "my slam")
+    assert project.run("--clean")[0] == 0 and (project.results / "external" / "other").is_dir()
+    assert project.run("--only", "table3")[0] == 0
+    assert table3_values(project, "my slam") == [] and table3_values(project, "other") == scored
+
+
+@pytest.mark.parametrize(
+    "name, line, message",
+    [
+        ("a/MH_03_medium.txt", "1400000000.1 0 0 0 0 0 1", "a/MH_03_medium.txt:1: has 7 fields, and a pose takes 8"),
+        ("a/MH03.txt", "", "a/MH03.txt: no sequence is called MH03; known: MH_03_medium, MH_01_easy"),
+    ],
+)
+def test_a_bad_file_of_another_system_is_named(project, name, line, message):
+    write_external(project, name, line)
+    code, output = project.run("--only", "table3", "table3_vio")
+    assert code == 1
+    assert f"| Error: {project.results}/external/{message}" in output
+    assert "table3         NOT MADE" in output and "table3_vio     made" in output

@@ -5,7 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from sgf_paper.paired import Estimate, compare_success, estimate_median, quantiles, ratios, verdict
+from sgf_paper.paired import (
+    Estimate, compare_success, estimate_median, estimate_ratio, quantiles, ratios, verdict,
+)  # fmt: skip
 
 INF, NAN = math.inf, math.nan
 
@@ -80,3 +82,32 @@ def test_pairs_that_see_the_same_images_are_drawn_together():
 def test_pairs_that_never_differ_show_nothing():
     found = compare_success([True, False], [True, False], "ab")
     assert (found.p, found.difference_pct, found.low_pct, found.high_pct) == (1, 0, 0, 0)
+
+
+def test_the_ratio_of_errors_is_the_middle_pair_whichever_way_round():
+    own, baseline = [1.0, 2.0, INF, 6.0, INF], [2.0, 1.0, 5.0, 2.0, INF]
+    found = estimate_ratio(own, baseline, "abcde")
+    # ratios 1/2, 2, infinite and 3; the last pair is lost twice
+    assert found.median == pytest.approx(math.sqrt(2 * 3)) and found.runs == 4
+    assert (found.low, found.high) == (pytest.approx(0.5), INF)
+    other = estimate_ratio(baseline, own, "abcde")
+    assert other.median == pytest.approx(1 / found.median) and other.low == 0
+    assert estimate_ratio([INF, 1.0], [1.0, INF], "ab").median == 1
+    assert estimate_ratio([INF], [INF], "a").runs == 0
+
+
+def test_the_interval_of_the_ratio_is_that_of_a_median_and_clusters_widen_it():
+    baseline = np.full(101, 2.0)
+    own = baseline * np.exp(np.arange(-50, 51) / 50)
+    apart = estimate_ratio(own, baseline, range(101))
+    # ranks 101 / 2 +- 1.96 * sqrt(101) / 2 by the normal approximation
+    assert math.log(apart.high) == pytest.approx(0.2, abs=0.05) and apart.median == pytest.approx(1)
+    assert math.log(apart.low) == pytest.approx(-0.2, abs=0.05)
+    together = estimate_ratio(own, baseline, np.arange(101) // 20)
+    assert together.runs == 6 and together.high > 1.5 * apart.high
+
+
+def test_clusters_of_one_pair_each_give_the_interval_of_the_plain_bootstrap():
+    ratio = np.exp(np.random.default_rng(1).normal(size=15))
+    found, plain = estimate_ratio(ratio, np.ones(15), range(15)), estimate_median(ratio)
+    assert (found.median, found.low, found.high) == pytest.approx((plain.median, plain.low, plain.high))

@@ -12,7 +12,7 @@ from matplotlib import pyplot
 from sgf_paper import config, odometry_scores, summary, trajectory_table
 from sgf_paper.config import ConfigError
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "table3.yaml").read_text())
+NODE = yaml.safe_load((config.EXPERIMENTS / "table3_dso.yaml").read_text())
 RENDERED = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 # Of four runs on a path of 2 m: ATE RMSE in m (infinite: lost), and success by sgf_eval's two rules.
 RUNS = {
@@ -29,8 +29,8 @@ def study(experiments):
     node["compared"] = ["sgf"]
     del node["conditions"]["local_light"]
     node["conditions"]["light"]["changes"] = {name: {"gamma": 2.2, "encode": False} for name in RENDERED[:2]}
-    (experiments / "table3.yaml").write_text(yaml.safe_dump(node, sort_keys=False))
-    return config.load_experiment("table3")
+    (experiments / "table3_dso.yaml").write_text(yaml.safe_dump(node, sort_keys=False))
+    return config.load_experiment("table3_dso")
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_mistakes_are_named(experiments, change, message):
 
 
 def test_the_papers_ten_sequences_and_v2_03_are_there():
-    table = config.load_experiment("table3")
+    table = config.load_experiment("table3_dso")
     published = config.load_published_trajectories(table)
     labels = [sequence.published for sequence in table.sequences.values() if sequence.published]
     assert [*labels[:-1], "avg"] == list(published["photo"]) == list(published["sgf"])
@@ -179,22 +179,23 @@ def test_success_is_compared_over_all_sequences(study, lines):
     assert compared.loc[("light", "ate"), fields].tolist() == [2, 4, 2, 25]
 
 
-def test_the_papers_grid_averages_its_ten_sequences_once_all_are_measured(study):
-    whole = [name for name, sequence in study.sequences.items() if sequence.published]
-    table = pd.DataFrame(
-        {
-            "sequence": name, "condition": "undisturbed", "column": "sgf",
-            "ate_mean_of_successes_mm": 1000 if name == "euroc_V2_03" else 50,
-        }
-        for name in whole
-    )  # fmt: skip
-    grid = trajectory_table.paper_grid(study, table)
-    cells = {row["column"]: dict(zip(grid["labels"], row["cells"])) for row in grid["rows"]}
-    assert (cells["sgf"]["MH1"], cells["sgf"]["avg"]) == ("0.050 (0.071)", "0.050 (0.206)")
-    assert (cells["sgf"]["V23"], cells["photo"]["V23"]) == ("1.000", "–")
-    assert (cells["photo"]["MH1"], cells["photo"]["avg"]) == ("– (0.051)", "– (0.227)")
-    grid = trajectory_table.paper_grid(study, table.iloc[1:])
-    assert grid["rows"][1]["cells"][-1] == "– (0.206)"
+def test_errors_are_compared_pair_by_pair_over_all_sequences_and_in_each(study, lines):
+    compared = trajectory_table.compare_errors(study, lines).set_index(["condition", "sequence"])
+    assert len(compared) == 2 * (1 + 2)
+    # of the runs: equal, the baseline fails, both fail, 30 mm over 20 mm
+    for sequence, runs in (("all", 2), ("MH_03_medium", 1)):
+        own = compared.loc[("light", sequence)]
+        assert (own["column"], own["baseline"]) == ("sgf", "photo")
+        assert (own["pairs"], own["both_failed"], own["ratio"]) == (4 * runs, runs, 1)
+        assert (own["ratio_low"], own["ratio_high"], own["verdict"]) == (0, 1.5, "undecided")
+
+
+@pytest.mark.parametrize("verdict_runs, said", [(4, "better"), (5, "undecided")])
+def test_a_verdict_on_errors_takes_enough_runs_of_each_sequence(study, lines, verdict_runs, said):
+    study.verdict_runs = verdict_runs
+    better = lines.assign(failed=False, ate_mm=lines["column"].map({"photo": 20, "sgf": 10}))
+    compared = trajectory_table.compare_errors(study, better)
+    assert set(compared["verdict"]) == {said} and set(compared["ratio_high"]) == {0.5}
 
 
 def test_published_values_stand_beside_whole_sequences(study, lines):
@@ -210,23 +211,23 @@ def test_published_values_stand_beside_whole_sequences(study, lines):
 def test_files_and_summary_show_what_failed(study, raw, tmp_path):
     tables = tmp_path / "tables"
     tables.mkdir()
-    trajectory_table.make_trajectory_table("table3", raw, RENDERED[:2], 4, tables, tmp_path)
-    document = (tables / "table3.md").read_text()
+    trajectory_table.make_trajectory_table("table3_dso", raw, RENDERED[:2], 4, tables, tmp_path)
+    document = (tables / "table3_dso.md").read_text()
     assert "| MH_01_easy | photo | 2/4 | 2/4 | 87.5 | 1.00 | ∞ [10.0, ∞] | ∞ [10.0, ∞] | ∞ | ∞ |" in document
     assert "| light | scale | sgf | photo | 2 | 8 | 4 | 2 | 0 | +25.0 [" in document
+    assert "| light | all | sgf | photo | 8 | 2 | 1.00 [0.00, 1.50] | undecided |" in document
     assert "- `MH_03_medium`: gamma 2.2, encode false\n" in document
     assert "left out: V1_02_medium, V1_03_difficult, euroc_MH_01_cut, euroc_MH_01, " in document
-    assert "| photo (published: dso) | – (0.051) |" in document
-    latex = (tables / "table3.tex").read_text()
+    latex = (tables / "table3_dso.tex").read_text()
     assert "MH\\_01\\_easy & photo & 2/4 & 2/4 & 87.5 & $\\infty$ [10.0, $\\infty$]" in latex
-    assert "photo & -- (0.051) & -- (0.045)" in latex
-    every = pd.read_csv(tables / "table3_runs.csv")
+    every = pd.read_csv(tables / "table3_dso_runs.csv")
     assert len(every) == 32 and every["failed"].sum() == 4 * (2 + 1)
     assert list(every["first_frame"].unique()) == [study.first_frame(run) for run in range(4)]
     said = [line.strip() for line in summary.stage_lines(study, tmp_path, 0)[1:]]
     assert said[2].startswith(
         "light, success by scale rule, 8 pairs of runs: sgf 6, photo 4, difference +25 [+0, "
     )
+    assert "light, ATE of sgf over that of photo, 8 pairs of runs: 1.00 [0.00, 1.50], undecided" in said
     assert said[-1] == "MH_03_medium, light, median ATE mm: sgf 35.0 (1/4 failed), photo inf (2/4 failed)"
 
 
