@@ -10,8 +10,9 @@
 #include <mrpt/obs/CObservationComment.h>
 #include <mrpt/sgf/CSgfOdometrySensor.h>
 
-#include <deque>
+#include <map>
 #include <set>
+#include <vector>
 
 #include "../src/nextOrEnd.h"
 
@@ -37,39 +38,61 @@ namespace
 const std::set<std::string> kKeys = {
 	"driver",          "process_rate",   "max_queue_len",
 	"grab_decimation", "sensorLabel",    "path",
-	"camera_config",   "camera_section", "emit_source"};
+	"camera_config",   "camera_section", "imu_config",
+	"imu_section",     "emit_source"};
 
-// Observations of a camera that is a sensor itself.
-class CCameraSource : public CObservationSource
+// Observations of other sensors, in the order of their times.
+class CSensorsSource : public CObservationSource
 {
  public:
-	explicit CCameraSource(mrpt::hwdrivers::CGenericSensor::Ptr camera)
-		: m_camera(std::move(camera))
+	explicit CSensorsSource(
+		const std::vector<mrpt::hwdrivers::CGenericSensor::Ptr>& sensors)
+		: m_sensors(sensors)
 	{
-		m_camera->initialize();
+		for (const auto& sensor : m_sensors) sensor->initialize();
 	}
 
 	mrpt::obs::CObservation::Ptr next() override
 	{
-		if (m_queue.empty())
-		{
-			m_camera->doProcess();
-			for (const auto& [time, object] : m_camera->getObservations())
-				if (auto obs =
-						std::dynamic_pointer_cast<mrpt::obs::CObservation>(
-							object))
-					m_queue.push_back(obs);
-		}
+		if (m_queue.empty()) askAll();
 		if (m_queue.empty()) return {};
-		auto obs = m_queue.front();
-		m_queue.pop_front();
+		auto obs = m_queue.begin()->second;
+		m_queue.erase(m_queue.begin());
 		return obs;
 	}
 
  private:
-	mrpt::hwdrivers::CGenericSensor::Ptr m_camera;
-	std::deque<mrpt::obs::CObservation::Ptr> m_queue;
+	void askAll()
+	{
+		for (const auto& sensor : m_sensors)
+		{
+			sensor->doProcess();
+			for (const auto& [time, object] : sensor->getObservations())
+				if (auto obs =
+						std::dynamic_pointer_cast<mrpt::obs::CObservation>(
+							object))
+					m_queue.emplace(obs->timestamp, obs);
+		}
+	}
+
+	std::vector<mrpt::hwdrivers::CGenericSensor::Ptr> m_sensors;
+	std::multimap<mrpt::Clock::time_point, mrpt::obs::CObservation::Ptr>
+		m_queue;
 };
+
+// A sensor of any driver, by a file with its section.
+mrpt::hwdrivers::CGenericSensor::Ptr sensorOf(
+	const std::string& driver, const mrpt::config::CConfigFile& file,
+	const std::string& section)
+{
+	auto sensor =
+		mrpt::hwdrivers::CGenericSensor::createSensorPtr(driver);
+	if (!sensor)
+		THROW_EXCEPTION_FMT(
+			"[%s]: driver '%s' is not known", section.c_str(), driver.c_str());
+	sensor->loadConfig(file, section);
+	return sensor;
+}
 
 }  // namespace
 
@@ -83,19 +106,27 @@ void CSgfOdometrySensor::loadConfig_sensorSpecific(
 	if (m_path.empty() == cameraFile.empty())
 		THROW_EXCEPTION_FMT(
 			"[%s]: has to have either path or camera_config", section.c_str());
-	if (cameraFile.empty()) return;
-	m_camera = createSensorPtr("CCameraSensor");
-	m_camera->loadConfig(
-		mrpt::config::CConfigFile(cameraFile),
-		config.read_string(section, "camera_section", "CAMERA"));
+	const auto imuFile = config.read_string(section, "imu_config", "");
+	if (cameraFile.empty() && !imuFile.empty())
+		THROW_EXCEPTION_FMT(
+			"[%s]: imu_config has to go with camera_config", section.c_str());
+	if (!cameraFile.empty())
+		m_sensors.push_back(sensorOf(
+			"CCameraSensor", mrpt::config::CConfigFile(cameraFile),
+			config.read_string(section, "camera_section", "CAMERA")));
+	if (imuFile.empty()) return;
+	const mrpt::config::CConfigFile file(imuFile);
+	const auto imuSection = config.read_string(section, "imu_section", "IMU");
+	m_sensors.push_back(sensorOf(
+		file.read_string(imuSection, "driver", ""), file, imuSection));
 }
 
 void CSgfOdometrySensor::initialize()
 {
-	if (m_camera)
-		m_source = std::make_unique<CCameraSource>(m_camera);
-	else
+	if (m_sensors.empty())
 		m_source = openObservations(m_path);
+	else
+		m_source = std::make_unique<CSensorsSource>(m_sensors);
 	m_state = ssWorking;
 }
 
@@ -112,7 +143,7 @@ void CSgfOdometrySensor::doProcess()
 			return emit(*result);
 	}
 	// A camera has no end: there was no image in this period.
-	if (m_camera) return;
+	if (!m_sensors.empty()) return;
 	if (const auto result = m_odometry.finish()) return emit(*result);
 	emitReport();
 }

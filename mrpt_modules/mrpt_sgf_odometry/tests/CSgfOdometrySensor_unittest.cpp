@@ -9,6 +9,7 @@
 #include <mrpt/hwdrivers/CGenericSensor.h>
 #include <mrpt/io/CFileGZOutputStream.h>
 #include <mrpt/obs/CObservationComment.h>
+#include <mrpt/obs/CObservationIMU.h>
 #include <mrpt/serialization/CArchive.h>
 #include <mrpt/sgf/CSgfOdometry.h>
 #include <mrpt/system/os.h>
@@ -53,15 +54,22 @@ std::string errorOf(const std::string& lines)
 	return "";
 }
 
-std::string writeDrive(const std::filesystem::path& folder)
+std::string write(
+	const std::filesystem::path& file,
+	const std::vector<CObservation::Ptr>& observations)
 {
-	const std::string file = folder / "drive.rawlog";
 	mrpt::io::CFileGZOutputStream stream(file);
 	auto archive = mrpt::serialization::archiveFrom(stream);
-	for (int i = 0; i < kFrames; ++i)
-		archive.WriteObject(
-			CRoom::stereo(CRoom::pose(i), CRoom::time(i)).get());
+	for (const auto& obs : observations) archive.WriteObject(obs.get());
 	return file;
+}
+
+std::string writeDrive(const std::filesystem::path& folder)
+{
+	std::vector<CObservation::Ptr> frames;
+	for (int i = 0; i < kFrames; ++i)
+		frames.push_back(CRoom::stereo(CRoom::pose(i), CRoom::time(i)));
+	return write(folder / "drive.rawlog", frames);
 }
 }  // namespace
 
@@ -140,6 +148,41 @@ TEST(CSgfOdometrySensor, TakesImagesFromACameraSensor)
 	EXPECT_EQ(poses, size_t(kFrames));
 }
 
+// The inertial sensor is a sensor of its own: here, one that emits a rawlog.
+TEST(CSgfOdometrySensor, TakesMeasurementsFromAnInertialSensor)
+{
+	const ::sgf::TempDir dir;
+	std::vector<CObservation::Ptr> measurements;
+	for (double s = 0.002; s < kFrames * 0.05; s += 0.005)
+		measurements.push_back(CRoom::imu(s));
+	const auto camera = dir.Write(
+		"camera.ini",
+		"[CAMERA]\nprocess_rate = 100\nsensorLabel = CAMERA\n"
+		"grabber_type = rawlog\nrawlog_file = " +
+			writeDrive(dir.path()) + "\n");
+	const auto imu = dir.Write(
+		"imu.ini",
+		"[IMU]\ndriver = CSgfOdometrySensor\nprocess_rate = 100\n"
+		"emit_source = true\npath = " +
+			write(dir.path() / "imu.rawlog", measurements) + "\n");
+	const auto sensor = makeSensor(
+		"estimator = stereo_inertial\ncamera_config = " + camera.string() +
+		"\nimu_config = " + imu.string() + "\nemit_source = true\n");
+	sensor->initialize();
+	size_t poses = 0, samples = 0;
+	for (int i = 0; i < kFrames; ++i)
+	{
+		sensor->doProcess();
+		for (const auto& [time, object] : sensor->getObservations())
+		{
+			poses += IS_CLASS(*object, CObservationRobotPose);
+			samples += IS_CLASS(*object, CObservationIMU);
+		}
+	}
+	EXPECT_EQ(poses, size_t(kFrames));
+	EXPECT_EQ(samples, measurements.size());
+}
+
 TEST(CSgfOdometrySensor, ParametersAreInItsSection)
 {
 	EXPECT_EQ(
@@ -158,6 +201,16 @@ TEST(CSgfOdometrySensor, BadSectionsAreNamed)
 			.find("section S: unknown key 'paht'"),
 		std::string::npos);
 	EXPECT_NE(errorOf("").find("camera_config"), std::string::npos);
+	EXPECT_NE(
+		errorOf("path = x.rawlog\nimu_config = i.ini")
+			.find("imu_config has to go with camera_config"),
+		std::string::npos);
+	const ::sgf::TempDir dir;
+	const auto imu = dir.Write("imu.ini", "[IMU]\ndriver = CNone\n");
+	EXPECT_NE(
+		errorOf("camera_config = c.ini\nimu_config = " + imu.string())
+			.find("CNone"),
+		std::string::npos);
 	EXPECT_NE(
 		errorOf("path = /nonexistent/x.rawlog").find("x.rawlog"),
 		std::string::npos);

@@ -11,6 +11,7 @@
 #include <mrpt/sgf/DataSourceSgfOdometry.h>
 
 #include <fstream>
+#include <map>
 
 #include "support/temp_dir.h"
 #include "syntheticRoom.h"
@@ -43,6 +44,36 @@ class CDrive : public CObservationSource
  private:
 	int m_frames, m_next = 0;
 	bool m_cutOff;
+};
+
+// A flight with an inertial sensor, whose measurements come late.
+class CFlight : public CObservationSource
+{
+ public:
+	explicit CFlight(int frames)
+	{
+		for (int i = 0; i < frames; ++i)
+			add(CRoom::stereo(CRoom::flight(0.05 * i), CRoom::time(i)), 0);
+		for (double s = 0.002; s < 0.05 * frames; s += 0.005)
+			add(CRoom::imu(s), 0.07);
+	}
+
+	CObservation::Ptr next() override
+	{
+		if (m_queue.empty()) return {};
+		auto obs = m_queue.begin()->second;
+		m_queue.erase(m_queue.begin());
+		return obs;
+	}
+
+ private:
+	void add(const CObservation::Ptr& obs, double delay_s)
+	{
+		m_queue.emplace(
+			mrpt::Clock::toDouble(obs->timestamp) + delay_s, obs);
+	}
+
+	std::multimap<double, CObservation::Ptr> m_queue;
 };
 
 class CApp : public mrpt::apps::RBPF_SLAM_App_Base, public DataSourceSgfOdometry
@@ -101,6 +132,35 @@ TEST(DataSourceSgfOdometry, GivesActionsWithFrames)
 	}
 	EXPECT_EQ(steps, 4);  // the first frame has no increment, one no right eye
 	EXPECT_LT((sum - CRoom::pose(5)).norm(), 0.01);
+}
+
+// Frames that wait come with the measurements that they have waited for, the
+// last ones at the end.
+TEST(DataSourceSgfOdometry, GivesFramesThatHaveWaited)
+{
+	constexpr int kFrames = 6;
+	CApp app;
+	app.source = std::make_unique<CFlight>(kFrames);
+	app.odometry.setMinLoggingLevel(mrpt::system::LVL_ERROR);
+	app.odometry.params.estimator = TEstimator::STEREO_INERTIAL;
+	mrpt::obs::CActionCollection::Ptr action;
+	mrpt::obs::CSensoryFrame::Ptr frame;
+	CObservation::Ptr none;
+	int steps = 0;
+	size_t measurements = 0;
+	while (app.impl_get_next_observations(action, frame, none))
+	{
+		EXPECT_EQ(
+			action->get(0)->timestamp,
+			mrpt::Clock::fromDouble(CRoom::time(++steps)));
+		for (const auto& obs : *frame)
+		{
+			measurements += IS_CLASS(*obs, mrpt::obs::CObservationIMU);
+			EXPECT_FALSE(IS_CLASS(*obs, mrpt::obs::CObservationStereoImages));
+		}
+	}
+	EXPECT_EQ(steps, kFrames - 1);
+	EXPECT_GT(measurements, 50U);
 }
 
 TEST(DataSourceSgfOdometry, ASourceThatIsCutOffEnds)

@@ -100,12 +100,11 @@ class CRoom
 		return {depth, greyAt(origin + depth * ray)};
 	}
 
-	/** \param k1 distortion */
 	static mrpt::img::CImage image(
 		const mrpt::poses::CPose3D& camera, double k1 = 0)
 	{
 		const auto ideal = CRoom::camera();
-		::sgf::Camera bent{kColumns,   kRows,      kFocal, kFocal,
+		const ::sgf::Camera bent{kColumns,   kRows,      kFocal, kFocal,
 						   ideal.cx(), ideal.cy(), k1};
 		mrpt::img::CImage out(kColumns, kRows, mrpt::img::CH_GRAY);
 		for (int y = 0; y < kRows; ++y)
@@ -121,10 +120,16 @@ class CRoom
 		return out;
 	}
 
-	/** Stereo images of a robot at a pose, by cameras side by side.
-	 * \param k1 their distortion */
+	/** Stereo images of a robot at a pose, rectified. */
 	static mrpt::obs::CObservationStereoImages::Ptr stereo(
-		const mrpt::poses::CPose3D& robot, double time_s, double k1 = 0)
+		const mrpt::poses::CPose3D& robot, double time_s)
+	{
+		return bentStereo(robot, time_s, 0);
+	}
+
+	/** The same by cameras with distortion. */
+	static mrpt::obs::CObservationStereoImages::Ptr bentStereo(
+		const mrpt::poses::CPose3D& robot, double time_s, double k1)
 	{
 		auto obs = mrpt::obs::CObservationStereoImages::Create();
 		obs->timestamp = mrpt::Clock::fromDouble(time_s);

@@ -12,6 +12,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace mrpt::sgf
 {
@@ -32,12 +33,14 @@ namespace mrpt::sgf
  * path             = in.rawlog   // a rawlog, or the folder of a data set
  * //camera_config  = cam.ini   // in place of path: file with a section
  * //camera_section = CAMERA    // for a CCameraSensor
+ * //imu_config     = imu.ini   // beside a camera: file with a section for a
+ * //imu_section    = IMU       // sensor, which its driver key names
  * //emit_source    = false     // also emit the observations of the source
  * \endcode
  *
  * The section may also have all parameters of CSgfOdometry::TParams. (Each
  * section of its configuration is a sensor to rawlog-grabber: those of the
- * odometry cannot have one of their own there, nor can the camera.)
+ * odometry cannot have one of their own there, nor can camera and IMU.)
  *
  * \ingroup mrpt_sgf_odometry_grp */
 class CSgfOdometrySensor : public mrpt::hwdrivers::CGenericSensor
@@ -71,7 +74,7 @@ class CSgfOdometrySensor : public mrpt::hwdrivers::CGenericSensor
 	CSgfOdometry m_odometry;
 	std::string m_path;  // if there is no camera
 	bool m_emitSource = false, m_ended = false;
-	mrpt::hwdrivers::CGenericSensor::Ptr m_camera;
+	std::vector<mrpt::hwdrivers::CGenericSensor::Ptr> m_sensors;
 	std::unique_ptr<CObservationSource> m_source;
 	mrpt::Clock::time_point m_lastTime;
 };
