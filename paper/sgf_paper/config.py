@@ -897,7 +897,8 @@ def _build_joined_table(node: dict[str, Any], where: str) -> JoinedTable:
             raise ConfigError(f"{where}: parts: {part.name} is no trajectory_table")
         for key in ("lost_below_pct", "fail_above_pct", "published"):
             if getattr(part, key) != getattr(joined.rule, key):
-                raise ConfigError(f"{where}: parts: {key} of {part.name} differs from that of {joined.rule.name}")
+                names = f"{part.name} differs from that of {joined.rule.name}"
+                raise ConfigError(f"{where}: parts: {key} of {names}")
     if unknown := set(joined.published) - set(load_published_rows(joined.rule)):
         raise ConfigError(f"{where}: published: the paper has no row {sorted(unknown)}")
     return joined

@@ -1,4 +1,4 @@
-"""Trajectories that other systems estimated, scored as our own: results/external/<system>/<sequence>.txt or .csv.
+"""Trajectories of other systems, scored as our own: results/external/<system>/<sequence>.txt or .csv.
 
 A .txt file is in TUM's format, a .csv file in that of EuRoC's ground truth. Times are kept digit by digit.
 """
@@ -26,7 +26,14 @@ MAX_NORM_ERROR = 1e-3  # that sgf_eval takes
 # Fields of a pose in the order of TUM's format: tx ty tz qx qy qz qw.
 TUM_FIELDS = [1, 2, 3, 4, 5, 6, 7]
 EUROC_FIELDS = [1, 2, 3, 5, 6, 7, 4]
-KEPT = ["path_m", "ate_mean_m", "ate_rmse_m", "rpe_one_second.translation_m", "coverage_pct", "success_by_scale"]
+KEPT = [
+    "path_m",
+    "ate_mean_m",
+    "ate_rmse_m",
+    "rpe_one_second.translation_m",
+    "coverage_pct",
+    "success_by_scale",
+]
 
 
 class ExternalError(Exception):
@@ -92,7 +99,9 @@ def read_poses(path: Path) -> list[Pose]:
         except ValueError as error:
             raise ExternalError(f"{path}:{number}: {error}") from None
         if pose.time_ns <= (poses[-1].time_ns if poses else -1):
-            raise ExternalError(f"{path}:{number}: the time {pose.time_ns} ns does not come after the one before")
+            raise ExternalError(
+                f"{path}:{number}: the time {pose.time_ns} ns does not come after the one before"
+            )
         poses.append(pose)
     if not poses:
         raise ExternalError(f"{path}: has no poses")
@@ -122,7 +131,9 @@ def check_names(joined: JoinedTable, path: Path, files: list[Path]) -> None:
         raise ExternalError(f"{path.parent}: both {files[0].name} and {files[1].name}; one of them has to go")
     own = [f"{prefix}_{column}" for prefix, part in joined.parts.items() for column in part.columns]
     if path.parent.name in own:
-        raise ExternalError(f"{path.parent}: {path.parent.name} is a system of our own; the folder needs another name")
+        raise ExternalError(
+            f"{path.parent}: {path.parent.name} is a system of our own; the folder needs another name"
+        )
     known = dict.fromkeys(sequence.euroc_name for sequence in joined.sequences)
     if path.stem not in known:
         raise ExternalError(f"{path}: no sequence is called {path.stem}; known: {', '.join(known)}")
@@ -156,7 +167,13 @@ class Scorer:
         with tempfile.TemporaryDirectory() as work:
             estimate, out = Path(work) / "estimate.txt", Path(work) / "scores.json"
             write_tum(poses, estimate)
-            command = [self.program, "trajectory", estimate, "--sequence", sequence.path(self.suite, self.data)]
+            command = [
+                self.program,
+                "trajectory",
+                estimate,
+                "--sequence",
+                sequence.path(self.suite, self.data),
+            ]
             command += ["--frame", how.frame, "--align", how.align, "--out", out]
             subprocess.run(command, check=True)
             scores = json.loads(out.read_text())

@@ -142,7 +142,9 @@ def make_lines(
 
     @param tables the parts' lines, by prefix.
     """
-    measured = [line for prefix, part in joined.parts.items() for line in part_lines(prefix, part, tables[prefix])]
+    measured = [
+        line for prefix, part in joined.parts.items() for line in part_lines(prefix, part, tables[prefix])
+    ]
     frame = pd.DataFrame(measured + external_lines(external), columns=[*KEYS, "measured", "runs"])
     published = pd.DataFrame(published_lines(joined, systems), columns=[*KEYS, "published"])
     frame = frame.merge(published, on=KEYS, how="outer")
@@ -153,7 +155,9 @@ def make_lines(
         "system": [system.name for system in systems],
         "quantity": list(MEASURED),
     }
-    frame = frame.sort_values(KEYS, key=lambda column: column.map(orders[column.name].index), ignore_index=True)
+    frame = frame.sort_values(
+        KEYS, key=lambda column: column.map(orders[column.name].index), ignore_index=True
+    )
     return frame.fillna({"runs": 0}).astype({"runs": int})[LINE]
 
 
@@ -310,7 +314,9 @@ def line_styles(joined: JoinedTable, systems: list[System]) -> dict[str, dict]:
     families: dict[str, list[str]] = {}
     for system in systems:
         own = [prefix for prefix in joined.parts if system.name.startswith(f"{prefix}_")]
-        families.setdefault(own[0] if own and system.group in (REBUILT, BEYOND) else "", []).append(system.name)
+        families.setdefault(own[0] if own and system.group in (REBUILT, BEYOND) else "", []).append(
+            system.name
+        )
     styles = {}
     for place, names in enumerate(families.values()):
         for index, name in enumerate(names):
@@ -377,7 +383,9 @@ def main() -> None:
     parser.add_argument("--raw", type=Path, required=True, help="folder of the parts' runs")
     parser.add_argument("--external", type=Path, nargs="*", default=[], help="scores of other systems")
     parser.add_argument("--left-out", nargs="*", default=[], help="theirs whose sequence is not at hand")
-    parser.add_argument("--tables", type=Path, required=True, help="folder of the parts' tables and for these")
+    parser.add_argument(
+        "--tables", type=Path, required=True, help="folder of the parts' tables and for these"
+    )
     parser.add_argument("--figures", type=Path, required=True, help="folder for the figure")
     a = parser.parse_args()
     make_joined_table(a.name, a.raw, a.external, a.left_out, a.tables, a.figures)

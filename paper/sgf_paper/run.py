@@ -91,8 +91,8 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
     if stage.kind == "disparity_figure":
         return stage.group(datasets) is not None
     if stage.kind in (
-        "contact_sheet", "convergence", "direct_map", "joined_table", "mrpt_map", "odometry", "self_match", "semi_dense",
-        "sequences", "shift_profile", "trajectory_table",
+        "contact_sheet", "convergence", "direct_map", "joined_table", "mrpt_map", "odometry", "self_match",
+        "semi_dense", "sequences", "shift_profile", "trajectory_table",
     ):  # fmt: skip
         return True  # rendered
     return stage.pair(datasets) is not None

@@ -137,7 +137,11 @@ def draw_curves(
         reached = np.sort(own.loc[~own["failed"], "ate_mm"]).clip(limits[0])
         shares = 100 * np.arange(reached.size + 1) / len(own)
         axis.step(
-            [limits[0], *reached, limits[1]], [*shares, shares[-1]], where="post", label=label, **styles[label]
+            [limits[0], *reached, limits[1]],
+            [*shares, shares[-1]],
+            where="post",
+            label=label,
+            **styles[label],
         )
     axis.set_xscale("log")
     axis.set(xlim=limits, ylim=(0, 103), xlabel="ATE RMSE, mm")

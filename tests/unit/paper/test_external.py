@@ -98,14 +98,18 @@ def test_how_a_system_is_scored_stands_in_its_folder(write, settings, message):
 
 
 def test_files_are_found_by_system_and_sequence_and_names_are_checked(joined, write, tmp_path):
-    paths = [write("", name) for name in ("a/MH_01_easy.txt", "b/MH_01_easy.csv", "b/MH_01_easy.txt", "b/x.txt")]
+    paths = [
+        write("", name) for name in ("a/MH_01_easy.txt", "b/MH_01_easy.csv", "b/MH_01_easy.txt", "b/x.txt")
+    ]
     write("", "b/notes.md")
     found = external.find_files(tmp_path / "external")
     assert found == {("a", "MH_01_easy"): paths[:1], ("b", "MH_01_easy"): paths[1:3], ("b", "x"): paths[3:]}
     external.check_names(joined, paths[0], paths[:1])
     with pytest.raises(ExternalError, match="both MH_01_easy.csv and MH_01_easy.txt"):
         external.check_names(joined, paths[1], paths[1:3])
-    with pytest.raises(ExternalError, match="x.txt: no sequence is called x; known: MH_01_easy, MH_03_medium"):
+    with pytest.raises(
+        ExternalError, match="x.txt: no sequence is called x; known: MH_01_easy, MH_03_medium"
+    ):
         external.check_names(joined, paths[3], paths[3:])
     with pytest.raises(ExternalError, match="vio_ngv is a system of our own"):
         external.check_names(joined, tmp_path / "vio_ngv" / "MH_01_easy.txt", [tmp_path])
@@ -137,7 +141,9 @@ def scorer(joined, tmp_path):
     return external.Scorer(joined, program, suite, str(data))
 
 
-@pytest.mark.parametrize("seconds, dataset", [("1600000000.05", "synthetic"), ("1403636579.763555", "euroc_slice")])
+@pytest.mark.parametrize(
+    "seconds, dataset", [("1600000000.05", "synthetic"), ("1403636579.763555", "euroc_slice")]
+)
 def test_times_tell_which_sequence_a_file_is_of(scorer, write, tmp_path, seconds, dataset):
     path = write(f"1 {POSE}\n{seconds} {POSE}\n1700000000 {POSE}\n")
     line = scorer.score(path)
@@ -145,7 +151,15 @@ def test_times_tell_which_sequence_a_file_is_of(scorer, write, tmp_path, seconds
     assert line["ate_mean_m"] == 7
     asked = (tmp_path / "asked").read_text().splitlines()
     root = "suite" if dataset == "synthetic" else "data/euroc"
-    assert asked == ["--sequence", str(tmp_path / root / "MH_01_easy"), "--frame", "body", "--align", "se3", "--out"]
+    assert asked == [
+        "--sequence",
+        str(tmp_path / root / "MH_01_easy"),
+        "--frame",
+        "body",
+        "--align",
+        "se3",
+        "--out",
+    ]
     assert len((tmp_path / "estimate").read_text().splitlines()) == 1, "only poses of the sequence's time"
 
 
@@ -156,13 +170,17 @@ def test_a_folder_may_ask_for_another_alignment(scorer, write, tmp_path):
 
 
 def test_poses_of_no_sequence_are_a_mistake(scorer, write):
-    with pytest.raises(ExternalError, match=r"no pose is of the time of MH_01_easy: 1600000000000000000 to .*slice"):
+    with pytest.raises(
+        ExternalError, match=r"no pose is of the time of MH_01_easy: 1600000000000000000 to .*slice"
+    ):
         scorer.score(write(f"5 {POSE}\n"))
 
 
 def test_sequences_that_are_not_at_hand_are_left_out(joined, scorer):
     assert not external.is_left_out(joined, "MH_01_easy", "")
-    assert external.is_left_out(joined, "MH_02_easy", "") and external.is_left_out(joined, "MH_02_easy", scorer.data)
+    assert external.is_left_out(joined, "MH_02_easy", "") and external.is_left_out(
+        joined, "MH_02_easy", scorer.data
+    )
     assert not external.is_left_out(joined, "x", ""), "a mistake"
 
 

@@ -39,7 +39,9 @@ def test_mistakes_are_named(monkeypatch, tmp_path, change, message):
 
 def test_parts_have_one_rule_of_failure(monkeypatch, tmp_path):
     for path in config.EXPERIMENTS.glob("table3*.yaml"):
-        (tmp_path / path.name).write_text(path.read_text().replace("lost_below_pct: 95", "lost_below_pct: 90", 1))
+        (tmp_path / path.name).write_text(
+            path.read_text().replace("lost_below_pct: 95", "lost_below_pct: 90", 1)
+        )
     (tmp_path / "table3_dso.yaml").write_text((config.EXPERIMENTS / "table3_dso.yaml").read_text())
     monkeypatch.setattr(config, "EXPERIMENTS", tmp_path)
     with pytest.raises(ConfigError, match="lost_below_pct of table3_vio differs from that of table3_dso"):
@@ -106,7 +108,12 @@ def lines(joined, systems, tables, scores):
 
 def test_systems_come_as_in_the_paper_then_those_beyond_it_then_others(systems):
     names = [system.name for system in systems]
-    assert names[:4] == ["orb_slam2", "svo2", "dso", "basalt"], "okvis has been run, so it is no row of the paper alone"
+    assert names[:4] == [
+        "orb_slam2",
+        "svo2",
+        "dso",
+        "basalt",
+    ], "okvis has been run, so it is no row of the paper alone"
     assert names[4:12] == ["dso_photo", "dso_sgf", *(f"vio_{c}" for c in "lssd gm gn sgf sgf2 sgf3".split())]
     assert names[12:16] == ["dso_ngv_motion", "vio_ngv", "vio_sgv", "vio_sgf3_vec"]
     assert names[-2:] == ["okvis", "slam"]
@@ -132,7 +139,11 @@ def value(lines, *key, field="measured"):
 
 def test_measured_stands_beside_published_under_euroc_s_names(lines):
     key = ("euroc", "MH_01_easy", "vio_lssd", "ate_mean_m")
-    assert [value(lines, *key, field=field) for field in ("measured", "published", "runs")] == [0.08, 0.076, 4]
+    assert [value(lines, *key, field=field) for field in ("measured", "published", "runs")] == [
+        0.08,
+        0.076,
+        4,
+    ]
     assert value(lines, "euroc", "MH_01_easy", "dso_sgf", "ate_mean_m", field="published") == 0.071
     assert value(lines, "euroc", "MH_02_easy", "vio_lssd", "ate_mean_m", field="runs") == 0
     assert value(lines, "euroc_slice", "MH_01_easy", "vio_ngv", "ate_rmse_m") == 0.06
@@ -141,7 +152,10 @@ def test_measured_stands_beside_published_under_euroc_s_names(lines):
     assert value(lines, "synthetic", "MH_01_easy", "vio_lssd", "rpe_1s_m") == 0.005
     assert list(lines["dataset"].unique()) == ["euroc", "euroc_slice", "synthetic"]
     assert list(lines["condition"].unique()) == ["undisturbed", "dso_light", "vio_light"]
-    assert list(lines.loc[lines["dataset"] == "euroc", "sequence"].unique())[::10] == ["MH_01_easy", "V2_03_difficult"]
+    assert list(lines.loc[lines["dataset"] == "euroc", "sequence"].unique())[::10] == [
+        "MH_01_easy",
+        "V2_03_difficult",
+    ]
 
 
 def test_other_systems_fail_by_the_rule_for_ours(lines):
@@ -170,7 +184,9 @@ def cells_of(blocks, title, label):
     block = next(block for block in blocks if block["title"] == title)
     row = next(row for row in block["rows"] if row["label"] == label)
     names = [*block["sequences"], "average", "success", "coverage"]
-    return {name: f"{cell.shown} {cell.reason}".strip() for name, cell in zip(names, row["cells"], strict=True)}
+    return {
+        name: f"{cell.shown} {cell.reason}".strip() for name, cell in zip(names, row["cells"], strict=True)
+    }
 
 
 def test_every_empty_cell_has_its_reason(joined, systems, lines):
@@ -185,7 +201,12 @@ def test_every_empty_cell_has_its_reason(joined, systems, lines):
     assert (lssd["MH_01"], lssd["MH_02"], lssd["V2_03"]) == ("0.0800 (0.076)", "(0.045) a", "0.9000")
     assert (lssd["average"], lssd["success"], lssd["coverage"]) == ("(0.066) d", "8/8", "99.5")
     basalt = cells_of(blocks, titles[0], "basalt")
-    assert (basalt["MH_02"], basalt["V2_03"], basalt["average"], basalt["success"]) == ("0.045", "– b", "0.066", "– b")
+    assert (basalt["MH_02"], basalt["V2_03"], basalt["average"], basalt["success"]) == (
+        "0.045",
+        "– b",
+        "0.066",
+        "– b",
+    )
     assert cells_of(blocks, titles[0], "vio_ngv")["V2_03"] == "– c"
     sgv = cells_of(blocks, titles[0], "vio_sgv")
     assert (sgv["MH_02"], sgv["success"], sgv["coverage"]) == ("– a", "– a", "– a")
@@ -231,7 +252,9 @@ def test_documents_lead_to_the_parts_and_explain_themselves(made):
     assert "whose sequence is not at hand: slam/V1_01_easy." in document
     assert "| *measured, beyond the paper* | |" in document
     assert "| vio_lssd (basalt) | 0.0800 (0.076) | (0.045) [a] |" in document
-    assert "[a]: the sequence is not at hand; [b]: the paper has no value; [c]: no run succeeds; [d]" in document
+    assert (
+        "[a]: the sequence is not at hand; [b]: the paper has no value; [c]: no run succeeds; [d]" in document
+    )
     latex = (made / "table3.tex").read_text()
     assert "vio\\_lssd (basalt) & 0.0800 (0.076) & (0.045)$^a$ &" in latex
     assert "\\multicolumn{15}{l}{\\emph{published}} \\\\" in latex and "basalt & 0.076 & 0.045" in latex
@@ -244,7 +267,9 @@ def test_timings_have_a_file_of_their_own(made):
     keys = timings[["dataset", "sequence", "system"]].apply(tuple, axis=1)
     assert len(keys) == 7 and ("euroc_slice", "MH_01_easy", "vio_ngv") in set(keys), "undisturbed runs only"
     first = timings.iloc[0]
-    assert (first["runs"], first["frames"], first["median_ms"]) == (1, 100, 50.5) and 99 < first["p99_ms"] < 200
+    assert (first["runs"], first["frames"], first["median_ms"]) == (1, 100, 50.5) and 99 < first[
+        "p99_ms"
+    ] < 200
 
 
 def test_the_summary_orders_systems_by_error(made, joined):
