@@ -25,6 +25,7 @@ FILES = {
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
     "shift_profile": "figures/{0}.png (.pdf), tables/{0}.csv (_minima.csv)",
     "trajectory_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _compared.csv, _runs.csv)",
+    "tuning": "{folder}/*.yaml, tables/{0}.md (.csv)",
 }
 MAIN_FILE = {
     "table": "tables/{}.csv",
@@ -42,6 +43,7 @@ MAIN_FILE = {
     "self_match": "tables/{}.csv",
     "shift_profile": "tables/{}.csv",
     "trajectory_table": "tables/{}.csv",
+    "tuning": "tables/{}.csv",
 }
 
 
@@ -186,6 +188,15 @@ def _trajectory_table_lines(path: Path) -> list[str]:
     return lines + _odometry_lines(path, "failed")
 
 
+def _tuning_lines(path: Path) -> list[str]:
+    """Per column and fold the error on the sequences that had no part in the tuning."""
+    return [
+        f"{row.column} tuned on {row.trained_on}, error elsewhere, % of the path: {row.held_out_tuned_pct:.2f},"
+        f" by default {row.held_out_default_pct:.2f}; ratio {row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
+        for row in pd.read_csv(path).itertuples()
+    ]
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
@@ -207,6 +218,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _self_match_lines(main_file(stage, results))
     if stage.kind == "trajectory_table":
         return _trajectory_table_lines(main_file(stage, results))
+    if stage.kind == "tuning":
+        return _tuning_lines(main_file(stage, results))
     return []
 
 
@@ -216,7 +229,8 @@ def stage_lines(stage: Experiment, results: Path, started: float) -> list[str]:
     if not path.exists():
         return [f"  {stage.name:14} NOT MADE"]
     state = "made" if path.stat().st_mtime >= started else "up to date"
-    head = f"  {stage.name:14} {state:11} {FILES[stage.kind].format(stage.name)}"
+    files = FILES[stage.kind].format(stage.name, folder=getattr(stage, "folder", ""))
+    head = f"  {stage.name:14} {state:11} {files}"
     return [head, *(f"    {line}" for line in _measured(stage, results))]
 
 
