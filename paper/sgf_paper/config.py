@@ -991,7 +991,8 @@ def load_tuned(column: str, program: str, sequence: str) -> dict[str, Any]:
     path = EXPERIMENTS / "tuned" / f"{column}.yaml"
     if not path.exists():
         raise ConfigError(
-            f"{path}: is missing; `./reproduce.sh --only tune` makes results/tuned/{column}.yaml, to be reviewed"
+            f"{path}: is missing; `./reproduce.sh --only tune` makes results/tuned/{column}.yaml,"
+            " to be looked at and copied"
         )
     node = read_yaml(path)
     if node["program"] != program:

@@ -191,8 +191,9 @@ def _trajectory_table_lines(path: Path) -> list[str]:
 def _tuning_lines(path: Path) -> list[str]:
     """Per column and fold the error on the sequences that had no part in the tuning."""
     return [
-        f"{row.column} tuned on {row.trained_on}, error elsewhere, % of the path: {row.held_out_tuned_pct:.2f},"
-        f" by default {row.held_out_default_pct:.2f}; ratio {row.ratio:.2f} [{row.ratio_low:.2f}, {row.ratio_high:.2f}]"
+        f"{row.column} tuned on {row.trained_on}, error elsewhere, % of the path:"
+        f" {row.held_out_tuned_pct:.2f}, by default {row.held_out_default_pct:.2f};"
+        f" ratio {text.format_estimate(row.ratio, row.ratio_low, row.ratio_high, 2)}"
         for row in pd.read_csv(path).itertuples()
     ]
 

@@ -100,7 +100,8 @@ def _sha256(file: Path) -> str:
 
 def manifests(tracker: Tracker, fold: int) -> dict[str, str]:
     """What identifies the data of a fold: the hash of each folder's list of hashes."""
-    return {name: _sha256(tracker.folder_of(name) / "manifest.yaml") for name in tracker.tuning.rendered(fold)}
+    names = tracker.tuning.rendered(fold)
+    return {name: _sha256(tracker.folder_of(name) / "manifest.yaml") for name in names}
 
 
 def study_name(tracker: Tracker, fold: int) -> str:

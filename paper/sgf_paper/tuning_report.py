@@ -1,4 +1,4 @@
-"""What was found for the options of a trajectory table's columns, and what it is worth on sequences not seen."""
+"""What was found for options of a trajectory table's columns, and what it is worth on other sequences."""
 
 from __future__ import annotations
 

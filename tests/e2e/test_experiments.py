@@ -407,8 +407,8 @@ def test_table_3_takes_the_calibration_of_what_is_rendered_and_tells_cuts_from_t
     assert not list((project.results / "raw" / "table3").rglob("*.ply")), "maps are large"
 
 
-# Of a column: a run that shows the defaults, and on each fold three trials and the defaults held out, two conditions
-# each. What was found is the defaults, as all errors are alike.
+# Of a column: a run that shows the defaults, and on each fold three trials and the defaults held out, two
+# conditions each. What was found is the defaults, as all errors are alike.
 FLIGHTS_OF_TUNING = 1 + 2 * (3 + 1) * 2
 
 
@@ -416,7 +416,7 @@ def test_what_is_tuned_is_written_with_both_folds_and_not_tuned_again(project):
     code, output = project.run("--only", "tune", "--jobs", "1")
     assert code == 0 and "tune           made        tuned/*.yaml, tables/tune.md (.csv)" in output, output
     assert len(project.flights()) == FLIGHTS_OF_TUNING
-    assert {flight.split()[2] for flight in project.flights()} == {"1001", "1002"}, "the table's seeds are below"
+    assert {flight.split()[2] for flight in project.flights()} == {"1001", "1002"}, "not the table's"
     found = yaml.safe_load((project.results / "tuned" / "sgf.yaml").read_text())
     assert found["build"]["revision"] == "fake" and set(found["data"]) == {"MH_01_easy", "MH_03_medium"}
     assert [(fold["trained_on"], fold["parameters"]) for fold in found["folds"]] == [
@@ -424,7 +424,7 @@ def test_what_is_tuned_is_written_with_both_folds_and_not_tuned_again(project):
         (["MH_01_easy"], found["defaults"]),
     ]
     assert found["folds"][0]["held_out"]["tuned"] == {"error_pct": 0.2222, "failed": 0}
-    assert "sgf tuned on MH_03_medium, error elsewhere, % of the path: 0.22, by default 0.22; ratio 1.00" in output
+    assert "sgf tuned on MH_03_medium, error elsewhere, % of the path: 0.22, by default 0.22;" in output
     (project.results / "tuned" / "sgf.yaml").unlink()
     code, output = project.run("--only", "tune")
     held_out = 1 + 2 * 2
@@ -464,7 +464,8 @@ def test_table_3_takes_the_options_of_the_fold_that_a_sequence_is_not_in(project
     wanted = [f"{name} sgf 1 {value}" for name, value in (("MH_01_easy", 0.75), ("MH_03_medium", 0.25))]
     wanted += [f"{name} lssd 1 default" for name in found]
     assert taken == sorted(2 * wanted)
-    assert "the options that were found without it" in (project.results / "tables" / "table3_vio.md").read_text()
+    document = (project.results / "tables" / "table3_vio.md").read_text()
+    assert "the options that were found without it" in document
 
 
 def test_table_3_says_what_it_lacks_without_tuned_options(project):

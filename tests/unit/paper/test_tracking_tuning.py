@@ -1,4 +1,4 @@
-"""Options found on one fold and scored on the other: folds, failures, going on after a stop, and what is taken."""
+"""Options found on one fold and scored on the other: folds, failures, going on, and what is taken."""
 
 import json
 import math
@@ -20,14 +20,12 @@ NOTED = """options:
   flow: {max_backward_px: 0.5, max_iterations: 5}
 build: {version: 1.2.3, revision: abc}
 """
-# Off by 1 % of the path where the way back is allowed 1 px, and by the more the farther from that. It notes its
-# sequence, and is told to fail or to lose frames by files beside it.
+# Off by 1 % of the path where the way back is allowed 1 px, and by the more the farther from that. Told to fail or
+# to lose frames by files beside it.
 PROGRAM = """#!/usr/bin/python3
 import json, math, pathlib, sys
 here = pathlib.Path(__file__).parent
-sequence, flags = pathlib.Path(sys.argv[1]), dict(zip(sys.argv[2::2], sys.argv[3::2]))
-with open(here / "flights", "a") as flights:
-    print(sequence.name, flags["--from"], flags["--change.seed"], file=flights)
+flags = dict(zip(sys.argv[2::2], sys.argv[3::2]))
 if (here / "fail").exists():
     sys.exit("no such option")
 backward = float(flags.get("--flow.max-backward-px", 0.5))
@@ -86,9 +84,17 @@ def tracker(tuning, tmp_path):
 
 @pytest.fixture
 def document(tracker, tmp_path, monkeypatch):
-    """What is written of a column whose runs are off by `error_of`."""
-    monkeypatch.setattr(Tracker, "error_pct", lambda *case: error_of(case[-1]))
-    return tracking_tuning.tune(tracker, tmp_path / "study.db")
+    """What is written of a column whose runs are off by `error_of`; held out are other runs than tuned on."""
+    runs = []
+
+    def error_pct(tracker, sequence, condition, run, options):
+        runs.append(run)
+        return error_of(options)
+
+    monkeypatch.setattr(Tracker, "error_pct", error_pct)
+    written = tracking_tuning.tune(tracker, tmp_path / "study.db")
+    assert [runs.count(run) for run in range(4)] == [2 * 12 * 4, 2 * 2 * 4, 2 * 2 * 4, 0]
+    return written
 
 
 def error_of(options):
@@ -288,4 +294,5 @@ def test_what_is_committed_is_of_the_experiment_as_it_is(column):
     for index, fold in enumerate(document["folds"]):
         assert fold["trained_on"] == tuning.rendered(1 - index)
         assert fold["parameters"].keys() == tuning.space.keys()
-        assert all(tuning.space[name].low <= v <= tuning.space[name].high for name, v in fold["parameters"].items())
+        for name, span in tuning.space.items():
+            assert span.low <= fold["parameters"][name] <= span.high
