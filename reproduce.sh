@@ -20,7 +20,7 @@ usage() {
 Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the experiments
        ./reproduce.sh test [OPTION]...   the same set-up, then the whole test suite
 
-  --only NAME...  only these experiments (see --list)
+  --only NAME...  only these experiments (see --list); `tune`, which takes an hour, runs only so
   --data DIR      folder with downloaded data sets; default: environment variable SGF_DATA, or none.
                   Without it the pairs that Debian packages ship are used.
   --sanitize      test: only the C++ unit tests, under the address and undefined-behaviour sanitizers
@@ -55,6 +55,11 @@ experiment_names() {
   for file in paper/experiments/*.yaml; do
     basename "$file" .yaml
   done
+}
+
+# Those that run when none is named: not those that take hours.
+default_names() {
+  grep -L '^by_name_only: true$' paper/experiments/*.yaml | xargs -n 1 basename -s .yaml
 }
 
 list_experiments() {
@@ -281,7 +286,7 @@ if [[ -n $data ]]; then
   data=$(realpath -- "$data")
   cd -- "$project"
 fi
-((${#stages[@]})) || mapfile -t stages < <(experiment_names)
+((${#stages[@]})) || mapfile -t stages < <(default_names)
 
 case $mode in
   list) list_experiments ;;

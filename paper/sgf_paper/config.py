@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from abc import ABC, abstractmethod
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Union
@@ -23,6 +23,7 @@ PUBLISHED = PAPER / "published.yaml"
 RECIPES = PROJECT / "datasets" / "synthetic"
 CATALOGUE = PROJECT / "datasets" / "catalogue.yaml"
 FIRST_FRAME_STEP = 7  # between runs of odometry
+TUNING_SEED = 1000  # that of a table's run and this make that of a run which options are tuned on
 
 
 class ConfigError(Exception):
@@ -532,11 +533,14 @@ class RepeatedRuns(SequenceExperiment, ABC):
         @param folder of the sequence. @param full the full rendered suite.
         """
         frames = self.sequences[sequence].frames_taken(full)
-        change = {**(self.change(sequence, condition) or {}), "seed": run + 1}
-        values = {f"change.{key}": value for key, value in change.items()}
-        values |= self.options(sequence, folder, condition, column)
-        values |= {"from": self.first_frame(run)} | ({"frames": frames} if frames else {})
-        return _command_line(values)
+        options = self.options(sequence, folder, condition, column)
+        stretch = {"from": self.first_frame(run)} | ({"frames": frames} if frames else {})
+        return _command_line(self.change_options(sequence, condition, run + 1) | options | stretch)
+
+    def change_options(self, sequence: str, condition: str, seed: int) -> dict[str, Any]:
+        """What a condition does to a sequence's images as options of a program."""
+        change = {**(self.change(sequence, condition) or {}), "seed": seed}
+        return {f"change.{key}": value for key, value in change.items()}
 
     @abstractmethod
     def change(self, sequence: str, condition: str) -> dict[str, Any] | None:
@@ -631,6 +635,7 @@ class TrajectoryTable(RepeatedRuns):
     margin_pct: float
     published: str
     programs: dict[str, TrackingProgram]
+    tuned: bool = False  # options on top of the columns' own: those tuned on the fold without the sequence
 
     def change(self, sequence: str, condition: str) -> dict[str, Any] | None:
         changes = self.conditions[condition].changes
@@ -643,7 +648,8 @@ class TrajectoryTable(RepeatedRuns):
         calibrated = self.conditions[condition].photometric and self.sequences[sequence].rendered
         takes_it = self.programs[self.program(column)].photometric
         calibration = {"photometric": folder / "mav0" / "cam0"} if calibrated and takes_it else {}
-        return {**self.columns[column].options, **calibration}
+        tuned = load_tuned(column, self.program(column), sequence) if self.tuned else {}
+        return {**self.columns[column].options, **tuned, **calibration}
 
     def score_flags(self, column: str) -> list[str]:
         program = self.programs[self.program(column)]
@@ -677,6 +683,67 @@ class JoinedTable:
     def rule(self) -> TrajectoryTable:
         """The part that says what is lost and what has failed: all say the same."""
         return next(iter(self.parts.values()))
+
+
+@dataclass(frozen=True)
+class SearchRange:
+    """Where an option's value is looked for."""
+
+    low: float
+    high: float
+    log: bool = False  # by factors, not by steps
+    integer: bool = False
+
+
+@dataclass(frozen=True)
+class TuningBudget:
+    """The same for every column and fold."""
+
+    trials: int  # the defaults' included
+    runs: int  # of each sequence and condition in a trial
+    held_out_runs: int  # the same on the other fold, of the defaults and of what was found
+    frames: int  # of a run
+
+
+@dataclass
+class TrackingTuning:
+    """What options of a trajectory table's programs are looked for, and on which sequences."""
+
+    kind: str
+    name: str
+    title: str
+    table: TrajectoryTable  # by its name in the file; its columns are taken without options tuned before
+    folder: str  # of what is found, below the results
+    folds: list[list[str]]  # all sequences of the table; those rendered are tuned on
+    conditions: list[str]
+    space: dict[str, SearchRange]
+    budget: TuningBudget
+    seed: int
+    columns: list[str] = field(default_factory=list)  # empty: all of the table
+    by_name_only: bool = False  # reproduce.sh runs it only if told to
+    like: str = ""  # experiment that has the keys left out here
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the experiments that this one is made of."""
+        return [name for name in (self.name, self.like, self.table.name) if name]
+
+    def rendered(self, fold: int) -> list[str]:
+        """The sequences of a fold that are always at hand."""
+        return [name for name in self.folds[fold] if self.table.sequences[name].rendered]
+
+    def flags(
+        self, sequence: str, folder: Path, condition: str, column: str, run: int, options: dict[str, Any]
+    ) -> list[str]:
+        """Flags of a column's program for a run, counted from 0.
+
+        It begins where no run of the table does, and sees other exposures.
+        """
+        table = self.table
+        values = table.change_options(sequence, condition, TUNING_SEED + run + 1)
+        values |= table.options(sequence, folder, condition, column) | options
+        first_frame = table.first_frames + table.first_frame(run)
+        return _command_line(values | {"from": first_frame, "frames": self.budget.frames})
 
 
 @dataclass
@@ -718,7 +785,7 @@ class Sequences:
 
 Experiment = Union[
     ContactSheet, Convergence, Sequences, Table, Density, DirectMap, LightChange, DisparityFigure, Benchmark,
-    JoinedTable, MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrajectoryTable,
+    JoinedTable, MrptMap, Odometry, SemiDense, SelfMatch, ShiftProfile, TrackingTuning, TrajectoryTable,
 ]
 
 
@@ -904,6 +971,41 @@ def _build_joined_table(node: dict[str, Any], where: str) -> JoinedTable:
     return joined
 
 
+def _load_untuned_table(name: str) -> TrajectoryTable:
+    """A trajectory table with its columns' own options alone."""
+    path = EXPERIMENTS / f"{name}.yaml"
+    return _build_trajectory_table({**read_yaml(path), "tuned": False}, str(path))
+
+
+def _check_tuning(tuning: TrackingTuning, where: str) -> None:
+    table = tuning.table
+    if len(tuning.folds) != 2 or sorted(sum(tuning.folds, [])) != sorted(table.sequences):
+        raise ConfigError(f"{where}: folds: each sequence of {table.name} has to be in one of two folds")
+    if not all(tuning.rendered(fold) for fold in (0, 1)):
+        raise ConfigError(f"{where}: folds: each needs a rendered sequence")
+    for key, known in (("conditions", table.conditions), ("columns", table.columns)):
+        if unknown := set(getattr(tuning, key)) - set(known):
+            raise ConfigError(f"{where}: {key}: {table.name} has no {sorted(unknown)}")
+    for name, span in tuning.space.items():
+        if not span.low < span.high or (span.log and span.low <= 0):
+            raise ConfigError(f"{where}: space.{name}: no range from {span.low} to {span.high}")
+    for name, count in asdict(tuning.budget).items():
+        if count < 1:
+            raise ConfigError(f"{where}: budget: {name} is {count}; it has to be positive")
+
+
+def _build_tuning(node: dict[str, Any], where: str) -> TrackingTuning:
+    if "like" in node:
+        node = {**read_yaml(EXPERIMENTS / f"{node['like']}.yaml"), "by_name_only": False, **node}
+    tuning = _build(TrackingTuning, node, where)
+    tuning.table = _load_untuned_table(tuning.table)
+    tuning.space = _build_each(SearchRange, tuning.space, f"{where}: space")
+    tuning.budget = _build(TuningBudget, tuning.budget, f"{where}: budget")
+    _check_tuning(tuning, where)
+    tuning.columns = tuning.columns or list(tuning.table.columns)
+    return tuning
+
+
 BUILDERS = {
     "benchmark": partial(_build, Benchmark),
     "contact_sheet": partial(_build, ContactSheet),
@@ -921,6 +1023,7 @@ BUILDERS = {
     "shift_profile": partial(_build, ShiftProfile),
     "table": _build_table,
     "trajectory_table": _build_trajectory_table,
+    "tuning": _build_tuning,
 }
 
 
@@ -938,6 +1041,23 @@ def load_experiments(kind: str) -> dict[str, Any]:
     """All experiments of one kind by name."""
     every = (load_experiment(path.stem) for path in sorted(EXPERIMENTS.glob("*.yaml")))
     return {experiment.name: experiment for experiment in every if experiment.kind == kind}
+
+
+def load_tuned(column: str, program: str, sequence: str) -> dict[str, Any]:
+    """Options of a column for a sequence: those that were found on the fold that the sequence is not in."""
+    path = EXPERIMENTS / "tuned" / f"{column}.yaml"
+    if not path.exists():
+        raise ConfigError(
+            f"{path}: is missing; `./reproduce.sh --only tune` makes results/tuned/{column}.yaml,"
+            " to be looked at and copied"
+        )
+    node = read_yaml(path)
+    if node["program"] != program:
+        raise ConfigError(f"{path}: holds options of {node['program']}, not of {program}")
+    for fold in node["folds"]:
+        if sequence in fold["used_for"] and sequence not in fold["trained_on"]:
+            return fold["parameters"]
+    raise ConfigError(f"{path}: has no options found without {sequence}")
 
 
 def load_published(table: Table, matcher: str) -> dict[str, dict[str, float]]:

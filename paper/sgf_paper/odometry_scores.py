@@ -90,15 +90,19 @@ class Scorer:
             command = [self.program, "trajectory", run.trajectory, "--sequence", self.folder]
             command += [*self.study.score_flags(run.column), "--out", out.name]
             common = ["--common", *(other.trajectory for other in others)] if others else []
-            subprocess.run([*command, *common], check=True)
+            subprocess.run([*command, *common], stdout=subprocess.DEVNULL, check=True)
             scores = json.loads(Path(out.name).read_text())
         if any(scores[name] is None for name in wanted):
             raise ScoresError(f"{run.trajectory}: {scores['poses']} common poses are too few for errors")
         return {"compared": scores["poses"], **{name: scores[key] for key, name in wanted.items()}}
 
+    def own_scores(self, run: Run) -> dict[str, Any]:
+        """Scores of a run on all of its own poses."""
+        return self._evaluate(run, [], OWN_SCORES)
+
     def scores(self, run: Run, kept: list[Run]) -> dict[str, Any]:
         """Scores of a run at the times that all runs kept have, and where wanted on its own poses."""
-        own = self._evaluate(run, [], OWN_SCORES) if self.study.SCORES_OWN else {}
+        own = self.own_scores(run) if self.study.SCORES_OWN else {}
         return own | self._evaluate(run, [other for other in kept if other is not run], ERRORS)
 
 

@@ -92,7 +92,7 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
         return stage.group(datasets) is not None
     if stage.kind in (
         "contact_sheet", "convergence", "direct_map", "joined_table", "mrpt_map", "odometry", "self_match",
-        "semi_dense", "sequences", "shift_profile", "trajectory_table",
+        "semi_dense", "sequences", "shift_profile", "trajectory_table", "tuning",
     ):  # fmt: skip
         return True  # rendered
     return stage.pair(datasets) is not None

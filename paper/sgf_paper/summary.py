@@ -26,6 +26,7 @@ FILES = {
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
     "shift_profile": "figures/{0}.png (.pdf), tables/{0}.csv (_minima.csv)",
     "trajectory_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _compared.csv, _ate_compared.csv, _runs.csv)",
+    "tuning": "{folder}/*.yaml, tables/{0}.md (.csv)",
 }
 MAIN_FILE = {
     "table": "tables/{}.csv",
@@ -44,6 +45,7 @@ MAIN_FILE = {
     "self_match": "tables/{}.csv",
     "shift_profile": "tables/{}.csv",
     "trajectory_table": "tables/{}.csv",
+    "tuning": "tables/{}.csv",
 }
 
 
@@ -207,6 +209,16 @@ def _joined_table_lines(path: Path) -> list[str]:
     return lines
 
 
+def _tuning_lines(path: Path) -> list[str]:
+    """Per column and fold the error on the sequences that had no part in the tuning."""
+    return [
+        f"{row.column} tuned on {row.trained_on}, error elsewhere, % of the path:"
+        f" {row.held_out_tuned_pct:.2f}, by default {row.held_out_default_pct:.2f};"
+        f" ratio {text.format_estimate(row.ratio, row.ratio_low, row.ratio_high, 2)}"
+        for row in pd.read_csv(path).itertuples()
+    ]
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
@@ -230,6 +242,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _self_match_lines(main_file(stage, results))
     if stage.kind == "trajectory_table":
         return _trajectory_table_lines(main_file(stage, results))
+    if stage.kind == "tuning":
+        return _tuning_lines(main_file(stage, results))
     return []
 
 
@@ -239,7 +253,8 @@ def stage_lines(stage: Experiment, results: Path, started: float) -> list[str]:
     if not path.exists():
         return [f"  {stage.name:14} NOT MADE"]
     state = "made" if path.stat().st_mtime >= started else "up to date"
-    head = f"  {stage.name:14} {state:11} {FILES[stage.kind].format(stage.name)}"
+    files = FILES[stage.kind].format(stage.name, folder=getattr(stage, "folder", ""))
+    head = f"  {stage.name:14} {state:11} {files}"
     return [head, *(f"    {line}" for line in _measured(stage, results))]
 
 

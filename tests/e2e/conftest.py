@@ -39,19 +39,37 @@ def drop_extra_columns(file):
     file.write_text(yaml.safe_dump(sweep, default_flow_style=None, sort_keys=False))
 
 
+def write_experiment(file, study):
+    """Writes an experiment; reproduce.sh reads its title in double quotes, and `by_name_only` in a line."""
+    title = study.pop("title")
+    file.write_text(f'title: "{title}"\n{yaml.safe_dump(study, sort_keys=False)}')
+
+
 def shorten_runs(file, kept, baseline="photo"):
-    """Keeps one of the rendered sequences, two columns, two conditions, and one run."""
+    """Keeps some of the rendered sequences, two columns, two conditions, and one run."""
     study = yaml.safe_load(file.read_text())
     rendered = [name for name, sequence in study["sequences"].items() if "rendered" in sequence]
     study["conditions"].pop("local_light", None)
-    for name in set(rendered) - {kept}:
+    for name in set(rendered) - set(kept):
         del study["sequences"][name]
         for condition in study["conditions"].values():
             condition.get("changes", {}).pop(name, None)
     study |= {"runs": 1, "compared": ["sgf"], "baselines": [baseline]}
     study["columns"] = {name: study["columns"][name] for name in ("sgf", baseline)}
-    title = study.pop("title")  # reproduce.sh reads it in double quotes
-    file.write_text(f'title: "{title}"\n{yaml.safe_dump(study, sort_keys=False)}')
+    write_experiment(file, study)
+
+
+def shorten_tuning(experiments):
+    """Keeps those of the table's sequences and columns that are kept there, and a few trials."""
+    table = yaml.safe_load((experiments / "table3_vio.yaml").read_text())
+    for name in ("tune", "tune_tiny"):
+        file = experiments / f"{name}.yaml"
+        tuning = yaml.safe_load(file.read_text())
+        for index, fold in enumerate(tuning.get("folds", [])):
+            tuning["folds"][index] = [sequence for sequence in fold if sequence in table["sequences"]]
+        tuning["budget"] |= {"trials": 3, "runs": 1, "held_out_runs": 1}
+        tuning |= {"columns": ["sgf"]}
+        write_experiment(file, tuning)
 
 
 class Project:
@@ -76,10 +94,11 @@ class Project:
         for sweep in (self.root / "paper" / "sweeps").iterdir():
             drop_extra_columns(sweep)
         experiments = self.root / "paper" / "experiments"
-        shorten_runs(experiments / "odometry.yaml", "V1_03_difficult")
+        shorten_runs(experiments / "odometry.yaml", ["V1_03_difficult"])
         for name in ("odometry_parts", "table3_dso"):
-            shorten_runs(experiments / f"{name}.yaml", "MH_03_medium")
-        shorten_runs(experiments / "table3_vio.yaml", "MH_03_medium", "lssd")
+            shorten_runs(experiments / f"{name}.yaml", ["MH_03_medium"])
+        shorten_runs(experiments / "table3_vio.yaml", ["MH_01_easy", "MH_03_medium"], "lssd")
+        shorten_tuning(experiments)
         light_change = experiments / "light_change.yaml"
         light_change.write_text(light_change.read_text().replace(", census]", "]"))
 
@@ -128,6 +147,11 @@ class Project:
         file = self.bin / "trackings"
         return file.read_text().splitlines() if file.exists() else []
 
+    def flights(self):
+        """`sequence residual seed` and the way back allowed of each run of the stand-in for sgf_vio."""
+        file = self.bin / "flights"
+        return file.read_text().splitlines() if file.exists() else []
+
     def fail(self, what):
         """Has a column `sweep/column` of sgf_eval or a command of sgf_render fail; None: no more."""
         self.bin.mkdir(parents=True, exist_ok=True)
@@ -140,11 +164,11 @@ class Project:
         for scene in scenes:
             (self.data / name / scene).mkdir(parents=True)
 
-    def wait_for_calls(self, count):
-        """Waits until so many columns have begun."""
+    def wait_for_calls(self, count, calls=None):
+        """Waits until so many columns have begun, or other calls."""
         deadline = time.time() + 120
-        while len(self.calls()) < count:
-            assert time.time() < deadline, "no column was begun"
+        while len((calls or self.calls)()) < count:
+            assert time.time() < deadline, "nothing was begun"
             time.sleep(0.05)
 
 

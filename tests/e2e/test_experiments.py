@@ -11,14 +11,22 @@ from conftest import PROJECT, main_columns
 SWEEPS = [yaml.safe_load(path.read_text()) for path in (PROJECT / "paper" / "sweeps").glob("*.yaml")]
 COLUMNS = [f"{sweep['name']}/{column}" for sweep in SWEEPS for column in main_columns(sweep)]
 CHANGED = [f"{column} {change}" for column in COLUMNS for change in ("encoded", "linear")]
-EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
+EXPERIMENTS = sorted(
+    path.stem
+    for path in (PROJECT / "paper" / "experiments").glob("*.yaml")
+    if not yaml.safe_load(path.read_text()).get("by_name_only")
+)
 ODOMETRY = ["odometry", "odometry_parts"]
 PARTS = ["table3_dso", "table3_vio"]
 TRACKED = [*ODOMETRY, *PARTS]
 # These need no data set.
 RENDERED = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "table3", "scenes", "sequences"]
+
+
+DRAWN = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "scenes", "sequences"]
+RENDERED = [*DRAWN, "tune_tiny"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
-PICTURES = ["density", *RENDERED, "fig1_curves", "fig4", "fig5", "light_change"]
+PICTURES = ["density", *DRAWN, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
     "tables": [
         f"{table}{end}"
@@ -31,6 +39,9 @@ FILES = {
     + [f"{name}{end}" for name in TRACKED for end in (".csv", "_compared.csv", "_runs.csv", ".md")]
     + [f"{name}{end}" for name in PARTS for end in ("_ate_compared.csv", ".tex")]
     + [f"table3{end}" for end in (".csv", "_light.csv", "_timings.csv", ".md", ".tex")]
+
+
+    + ["table3.tex", "table3_vio.tex", "tune_tiny.csv", "tune_tiny.md"]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
@@ -268,6 +279,9 @@ def test_full_renders_the_full_suite_beside_the_short_one(project):
     [
         ("pair", "pairs.log", ["convergence", "fig1", "fig3", "scenes"]),
         ("sequence", "sequences_run.log", ["fig6", "mrpt_map", *TRACKED, "table3", "sequences"]),
+
+
+        ("sequence", "sequences_run.log", ["fig6", "mrpt_map", *TRACKED, "sequences", "tune_tiny"]),
     ],
 )
 def test_a_failing_renderer_fails_only_what_needs_it(project, command, log, lost):
@@ -449,3 +463,76 @@ def test_a_bad_file_of_another_system_is_named(project, name, line, message):
     assert code == 1
     assert f"| Error: {project.results}/external/{message}" in output
     assert "table3         NOT MADE" in output and "table3_vio     made" in output
+
+
+    assert not list((project.results / "raw" / "table3").rglob("*.ply")), "maps are large"
+
+
+# Of a column: a run that shows the defaults, and on each fold three trials and the defaults held out, two
+# conditions each. What was found is the defaults, as all errors are alike.
+FLIGHTS_OF_TUNING = 1 + 2 * (3 + 1) * 2
+
+
+def test_what_is_tuned_is_written_with_both_folds_and_not_tuned_again(project):
+    code, output = project.run("--only", "tune", "--jobs", "1")
+    assert code == 0 and "tune           made        tuned/*.yaml, tables/tune.md (.csv)" in output, output
+    assert len(project.flights()) == FLIGHTS_OF_TUNING
+    assert {flight.split()[2] for flight in project.flights()} == {"1001", "1002"}, "not the table's"
+    found = yaml.safe_load((project.results / "tuned" / "sgf.yaml").read_text())
+    assert found["build"]["revision"] == "fake" and set(found["data"]) == {"MH_01_easy", "MH_03_medium"}
+    assert [(fold["trained_on"], fold["parameters"]) for fold in found["folds"]] == [
+        (["MH_03_medium"], found["defaults"]),
+        (["MH_01_easy"], found["defaults"]),
+    ]
+    assert found["folds"][0]["held_out"]["tuned"] == {"error_pct": 0.2222, "failed": 0}
+    assert "sgf tuned on MH_03_medium, error elsewhere, % of the path: 0.22, by default 0.22;" in output
+    (project.results / "tuned" / "sgf.yaml").unlink()
+    code, output = project.run("--only", "tune")
+    held_out = 1 + 2 * 2
+    assert code == 0 and len(project.flights()) == FLIGHTS_OF_TUNING + held_out, "trials are in the database"
+
+
+def test_a_killed_tuning_goes_on_with_the_trials_that_are_missing(project, kill):
+    process = project.start("--only", "tune", "--jobs", "1", SGF_FAKE_SECONDS="0.5")
+    project.wait_for_calls(6, project.flights)
+    assert kill(process)[0] == -9
+    begun = len(project.flights())
+    code, output = project.run("--only", "tune")
+    assert code == 0, output
+    assert len(project.flights()) <= FLIGHTS_OF_TUNING + begun - 4, "trials that were done are not repeated"
+
+
+def use_tuned(project, parameters):
+    """Has table3_vio take tuned options; those of `sgf` by fold."""
+    study = project.root / "paper" / "experiments" / "table3_vio.yaml"
+    text = study.read_text().replace("tuned: false\n", "tuned: true\n")
+    assert "tuned: true\n" in text
+    study.write_text(text)
+    for column in ("sgf", "lssd"):
+        file = study.parent / "tuned" / f"{column}.yaml"
+        node = yaml.safe_load(file.read_text())
+        for fold in node["folds"]:
+            fold["parameters"] = parameters[fold["trained_on"][0]] if column == "sgf" else {}
+        file.write_text(yaml.safe_dump(node))
+
+
+def test_table_3_takes_the_options_of_the_fold_that_a_sequence_is_not_in(project):
+    found = {"MH_01_easy": 0.25, "MH_03_medium": 0.75}
+    use_tuned(project, {name: {"flow.max_backward_px": value} for name, value in found.items()})
+    code, output = project.run("--only", "table3_vio", "tune_tiny")
+    assert code == 0, output
+    taken = sorted(flight for flight in project.flights() if flight.split()[2] == "1")
+    wanted = [f"{name} sgf 1 {value}" for name, value in (("MH_01_easy", 0.75), ("MH_03_medium", 0.25))]
+    wanted += [f"{name} lssd 1 default" for name in found]
+    assert taken == sorted(2 * wanted)
+    document = (project.results / "tables" / "table3_vio.md").read_text()
+    assert "the options that were found without it" in document
+
+
+def test_table_3_says_what_it_lacks_without_tuned_options(project):
+    use_tuned(project, {"MH_01_easy": {}, "MH_03_medium": {}})
+    file = project.root / "paper" / "experiments" / "tuned" / "sgf.yaml"
+    file.unlink()
+    code, output = project.run("--only", "table3_vio")
+    assert code == 1
+    assert f"{file}: is missing; `./reproduce.sh --only tune` makes results/tuned/sgf.yaml" in output
