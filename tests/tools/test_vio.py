@@ -135,9 +135,9 @@ def test_tracks_a_sequence(whole, tmp_path):
     timings = (out / "timings.csv").read_text().splitlines()
     assert len(timings) == FRAMES + 1 and timings[0].startswith("time_ns,pyramid_ms")
     assert "residual: ngv" in (out / "options.yaml").read_text()
-    states = {"trajectory.txt", "states.csv", "covariances.csv", "points.ply"}
+    found = {"trajectory.txt", "states.csv", "covariances.csv", "points.ply"}
     about = {"timings.csv", "events.jsonl", "summary.json", "options.yaml"}
-    assert {path.name for path in out.iterdir()} == states | about
+    assert {path.name for path in out.iterdir()} == found | about
 
 
 def test_is_the_same_for_any_number_of_threads(whole, tmp_path):
