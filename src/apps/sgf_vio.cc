@@ -40,6 +40,21 @@ struct Arguments {
   bool real_time = false;
 };
 
+/// One of the cameras: tells once that it has shown too little for some frames.
+class Eye {
+ public:
+  static constexpr int kPatience = 10;
+
+  template <class Tell>
+  void Look(bool sees, const Tell& tell) {
+    blind_ = sees ? 0 : blind_ + 1;
+    if (blind_ == kPatience) tell();
+  }
+
+ private:
+  int blind_ = 0;
+};
+
 /// What happens to the state.
 class EventLog {
  public:
@@ -51,9 +66,16 @@ class EventLog {
             {{"tracks", result.tracks}, {"landmarks", result.landmarks}});
     if (result.state != state_) Write(frame, result, EnumName(result.state), {});
     if (result.problem != problem_ && result.problem != vio::InitialisationProblem::kNone) {
-      Write(frame, result, "no_start", {{"problem", EnumName(result.problem)}});
-      spdlog::warn("the inertial sensor takes no part yet: {}", vio::Explain(result.problem));
+      Write(frame, result, inertial_ ? "left_out" : "no_start",
+            {{"problem", EnumName(result.problem)}});
+      spdlog::warn("frame {}: the inertial sensor takes no part {}: {}", frame,
+                   inertial_ ? "any more" : "yet", vio::Explain(result.problem));
     }
+    const bool left_sees = result.tracks >= kLeastTracks;
+    left_.Look(left_sees, [&] { Blind(frame, result, "left", "nothing to follow"); });
+    right_.Look(!left_sees || result.stereo_tracks >= kLeastMatched * result.tracks, [&] {
+      Blind(frame, result, "right", "next to nothing of what the left one does");
+    });
     if (result.inertial != inertial_)
       Write(frame, result, result.inertial ? "inertial" : "visual", {});
     problem_ = result.problem;
@@ -76,7 +98,18 @@ class EventLog {
     file_.Write(frame, result.time_ns, event, all);
   }
 
+  void Blind(int frame, const vio::VioFrameResult& result, const std::string& camera,
+             const char* sees) {
+    Write(frame, result, camera + "_blind", {});
+    spdlog::warn("frame {}: for {} frames the {} camera has shown {}: covered, dark, out of step?",
+                 frame, Eye::kPatience, camera, sees);
+  }
+
+  static constexpr int kLeastTracks = 10;
+  static constexpr double kLeastMatched = 0.1;
+
   EventFile file_;
+  Eye left_, right_;
   std::optional<vio::VioState> state_;
   vio::InitialisationProblem problem_ = vio::InitialisationProblem::kNone;
   bool inertial_ = false;
@@ -266,11 +299,22 @@ void WriteSummary(const fs::path& file, const OdometrySequence& sequence, size_t
         {"gaps", run.imu.gaps},
         {"longest_gap_s", run.imu.longest_gap_s}}}};
   WriteTextFile(file, summary.dump(2) + "\n");
-  spdlog::info("{} of {} frames have a pose, {} dropped, {} key-frames, {} points", posed, frames,
-               run.dropped, keyframes, points);
+  spdlog::log(posed > 0 ? spdlog::level::info : spdlog::level::warn,
+              "{} of {} frames have a pose, {} dropped, {} key-frames, {} points", posed, frames,
+              run.dropped, keyframes, points);
   if (total_ms.empty()) return;
   spdlog::info("a frame took {:.1f} ms in the median, {:.1f} ms at the 99th percentile",
                Median(total_ms), Quantile(total_ms, 0.99));
+}
+
+void WarnOfImu(const vio::ImuHealth& imu) {
+  const auto warn = [&](std::int64_t count, const std::string& what) {
+    if (count > 0) spdlog::warn("inertial measurements: {} {}, {} taken", count, what, imu.taken);
+  };
+  warn(imu.duplicates + imu.backwards, "not after the one before");
+  warn(imu.not_finite, "that are no numbers");
+  warn(imu.saturated, "saturated");
+  warn(imu.gaps, fmt::format("gaps of up to {:.3g} s", imu.longest_gap_s));
 }
 
 void RunVio(const Arguments& arguments, const OptionFlags& flags) {
@@ -286,7 +330,7 @@ void RunVio(const Arguments& arguments, const OptionFlags& flags) {
   const fs::path folder = arguments.run.output;
   MakeFolder(folder);  // before the work, which would be lost
   if (const int skipped = sequence.skipped_frames)
-    spdlog::warn("left out: {} x frame with a missing file", skipped);
+    spdlog::warn("left out: {} x frame without one of its images", skipped);
   EventLog events(folder / "events.jsonl");
   PointFile points(folder / "points.ply");
   const Run run = TrackSequence(sequence, frames, arguments, options, events, points);
@@ -296,6 +340,7 @@ void RunVio(const Arguments& arguments, const OptionFlags& flags) {
   WriteTimings(folder / "timings.csv", run);
   WriteRunOptions(folder / "options.yaml", WriteOptions(options));
   events.Close();
+  WarnOfImu(run.imu);
   WriteSummary(folder / "summary.json", sequence, frames.size(), run, points.Close());
 }
 

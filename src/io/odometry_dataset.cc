@@ -55,9 +55,9 @@ void AppendFrame(OdometrySequence& sequence, OdometryFrame frame) {
 // ---- EuRoC
 
 // Frames that both cameras list, in one pass over the two lists.
-void PairImages(const std::vector<EurocImage>& left, const std::vector<EurocImage>& right,
-                OdometrySequence& sequence) {
-  size_t i = 0, j = 0;
+void PairImages(const fs::path& folder, const std::vector<EurocImage>& left,
+                const std::vector<EurocImage>& right, OdometrySequence& sequence) {
+  size_t i = 0, j = 0, pairs = 0;
   while (i < left.size() || j < right.size()) {
     const bool has_left =
         i < left.size() && (j == right.size() || left[i].time_ns <= right[j].time_ns);
@@ -69,7 +69,10 @@ void PairImages(const std::vector<EurocImage>& left, const std::vector<EurocImag
       ++sequence.skipped_frames;
     i += has_left;
     j += has_right;
+    pairs += has_left && has_right;
   }
+  if (pairs == 0)
+    throw Error(folder.string(), "cam0 and cam1 have no time in common: are they synchronised?");
 }
 
 void OpenEuroc(const fs::path& folder, OdometrySequence& sequence) {
@@ -79,7 +82,7 @@ void OpenEuroc(const fs::path& folder, OdometrySequence& sequence) {
                 fmt::format("has {} camera(s), expected one or two", euroc.images.size()));
   sequence.cameras = euroc.sensors.cameras;
   if (euroc.images.size() == 2)
-    PairImages(euroc.images[0], euroc.images[1], sequence);
+    PairImages(folder, euroc.images[0], euroc.images[1], sequence);
   else
     for (const EurocImage& image : euroc.images[0])
       AppendFrame(sequence, {image.time_ns, image.file, {}, {}});

@@ -15,7 +15,7 @@ struct ImuBufferOptions {
   double gap_noise_factor = 100;
   double gyro_full_scale = 17.4;
   double accel_full_scale = 176;
-  double saturation_noise_factor = 1000;
+  double saturation_noise_factor = 1e4;
   double max_span_s = 60;
 
   template <class V>

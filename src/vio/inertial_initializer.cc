@@ -359,7 +359,7 @@ const char* Explain(Problem problem) {
     case Problem::kTooLittleData:
       return "too little data or motion yet";
     case Problem::kGapInData:
-      return "inertial measurements are missing";
+      return "inertial measurements are missing: a gap, or another clock?";
     case Problem::kMoving:
       return "the body is not at rest";
     case Problem::kGyroscopeInDegrees:
@@ -373,7 +373,9 @@ const char* Explain(Problem problem) {
     case Problem::kGravityMagnitude:
       return "gravity has the wrong magnitude: unit of the acceleration, or scale of the poses?";
     case Problem::kMotionDisagrees:
-      return "acceleration does not fit the visual motion: axes, clock, or scale of the poses?";
+      return "measured motion is not the visual one: axes or clock of the inertial sensor, scale "
+             "of the "
+             "poses, or images of other times?";
   }
   return "?";
 }

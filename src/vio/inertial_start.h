@@ -23,7 +23,12 @@ class InertialStart {
   ///   where it was too early to ask.
   std::optional<InertialInitialisation> Add(const TimedPose& pose, const ImuBuffer& imu);
 
+  /// Forgets the poses.
   void Clear() { poses_.clear(); }
+
+  /// What was found has turned out to be wrong: rest is no reason to believe the sensor any more,
+  /// and it is not asked for a while, longer each time.
+  void Refute(std::int64_t time_ns);
 
   /// From when on measurements are needed.
   std::optional<std::int64_t> first_ns() const {
@@ -31,6 +36,7 @@ class InertialStart {
   }
 
  private:
+  InertialInitialisation Ask(const ImuBuffer& imu);
   bool IsAtRest() const;
   InertialInitialisation StartAtRest(const ImuBuffer& imu) const;
 
@@ -38,6 +44,9 @@ class InertialStart {
   double span_s_;
   size_t least_poses_;
   std::vector<TimedPose> poses_;
+  InitialisationProblem in_motion_ = InitialisationProblem::kNone;  ///< when last asked there
+  double pause_s_ = 5;
+  std::int64_t not_before_ns_ = 0;
 };
 
 }  // namespace sgf::vio

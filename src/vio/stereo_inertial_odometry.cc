@@ -36,6 +36,8 @@ void CheckOptions(const VioOptions& options) {
   require(options.least_sights >= 3, "least_sights", options.least_sights, "at least 3");
   require(options.blind_s >= 0, "blind_s", options.blind_s, "at least 0");
   require(options.start_s > 0, "start_s", options.start_s, "positive");
+  require(options.max_inertial_error > 0, "max_inertial_error", options.max_inertial_error,
+          "positive");
   require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
@@ -85,7 +87,8 @@ class StereoInertialOdometry::Impl {
       Marginalize();
     }
     imu_.DropBefore(start_.first_ns().value_or(time_ns));
-    result.inertial = inertial_;
+    result.inertial = inertial_ && Newest()->inertial;
+    if (inertial_ && !result.inertial) result.problem = InitialisationProblem::kGapInData;
     result.times.marginalization_s = stage.Lap();
     result.times.total_s = total.Lap();
     return result;
@@ -113,7 +116,21 @@ class StereoInertialOdometry::Impl {
     return {{T_body_left, T_body_left * rig.T_left_right}, 0.5 * (rig.left.fx + rig.left.fy)};
   }
 
+  using PoseSigmas = Eigen::Matrix<double, kPoseParameters, 1>;
+  static PoseSigmas HeldPose() {
+    constexpr double kHeld = 1e-4;  // rad, m
+    return PoseSigmas::Constant(kHeld);
+  }
+
   const Frame* Newest() const { return window_.frames.empty() ? nullptr : &window_.frames.back(); }
+
+  /// Whether it is known better than by constant velocity: not where the sensor is saturated.
+  static bool TellsPose(const Preintegration& imu) {
+    constexpr double kRotationSd_rad = 0.05, kPositionSd_m = 0.05;
+    const auto variance = imu.covariance().diagonal();
+    return variance.segment<3>(kRotation).maxCoeff() < kRotationSd_rad * kRotationSd_rad &&
+           variance.segment<3>(kPosition).maxCoeff() < kPositionSd_m * kPositionSd_m;
+  }
 
   /// The new frame where the inertial sensor, or constant velocity, takes the last one.
   Frame Predict(std::int64_t time_ns) const {
@@ -125,10 +142,11 @@ class StereoInertialOdometry::Impl {
     if (!last) return frame;
     if (options_.inertial)
       frame.since_last = imu_.Between(last->state.time_ns, time_ns, BiasOf(last->state));
+    const bool told = frame.since_last && TellsPose(*frame.since_last);
     if (frame.since_last && last->inertial) {
       frame.state = frame.since_last->Predict(last->state, options_.window.gravity);
       frame.inertial = true;
-      return frame;
+      if (told) return frame;
     }
     if (window_.frames.size() >= 2) {
       const BodyState& before = window_.frames[window_.frames.size() - 2].state;
@@ -137,14 +155,14 @@ class StereoInertialOdometry::Impl {
       const SE3 motion = before.T_world_body.Inverse() * last->state.T_world_body;
       frame.state.T_world_body = last->state.T_world_body * PartOf(motion, share);
     }
-    if (frame.since_last && !doubts_gyro_)
+    if (told && gyro_fits_)
       frame.state.T_world_body.R = last->state.T_world_body.R * frame.since_last->delta_R();
     return frame;
   }
 
   std::optional<Eigen::Quaterniond> RotationSinceLast(const Frame& frame) const {
     const Frame* last = Newest();
-    if (!last || !frame.since_last || doubts_gyro_) return std::nullopt;
+    if (!last || !frame.since_last) return std::nullopt;
     const Eigen::Quaterniond R_body_left = window_.rig().T_body_cam[0].R;
     return R_body_left.conjugate() * frame.state.T_world_body.R.conjugate() *
            last->state.T_world_body.R * R_body_left;
@@ -182,7 +200,7 @@ class StereoInertialOdometry::Impl {
     }
     frame.keyframe = true;
     start_.Clear();
-    window_.AnchorPose(frame, Eigen::Matrix<double, kPoseParameters, 1>::Constant(kHeld));
+    window_.AnchorPose(frame, HeldPose());
   }
 
   /// Lets the inertial sensor take part as soon as it can be told where down is.
@@ -211,8 +229,7 @@ class StereoInertialOdometry::Impl {
         frame.since_last = imu_.Between(window_.frames[k - 1].state.time_ns, frame.state.time_ns,
                                         BiasOf(frame.state));
     }
-    Eigen::Matrix<double, kPoseParameters, 1> pose;
-    pose.setConstant(kHeld);
+    PoseSigmas pose = HeldPose();
     pose.head<2>().setConstant(found.tilt_sd_rad);
     window_.AnchorPose(window_.frames.front(), pose);
     constexpr double kVelocitySigma = 0.2;  // m/s
@@ -220,7 +237,7 @@ class StereoInertialOdometry::Impl {
     motion << Vector3d::Constant(kVelocitySigma), found.gyro_bias_sd, found.accel_bias_sd;
     window_.AnchorMotion(window_.frames[first], motion);
     inertial_ = true;
-    doubts_gyro_ = false;
+    disagreement_ = 0;
     start_.Clear();
     R_gravity_world_ = found.T_world_visual.R * R_gravity_world_;
     last_ = window_.frames.back().state;
@@ -330,6 +347,10 @@ class StereoInertialOdometry::Impl {
     const bool first = window_.frames.size() == 1;
     if (!first) {
       result.window = window_.Refine();
+      if (InertialDisagrees(result.window)) {
+        LeaveInertialOut(result);
+        result.window = window_.Refine();
+      }
       result.window.outliers = window_.RemoveOutliers();
     }
     const double blind_s = 1e-9 * static_cast<double>(newest.state.time_ns - last_sight_ns_);
@@ -344,6 +365,7 @@ class StereoInertialOdometry::Impl {
       result.state = VioState::kTracked;
       last_sight_ns_ = newest.state.time_ns;
     }
+    if (!inertial_) JudgeGyroscope(result.state);
     result.body = last_;
     result.body.time_ns = result.time_ns;
     if (result.state == VioState::kLost) return;
@@ -358,6 +380,41 @@ class StereoInertialOdometry::Impl {
     const FrameCovariance known = window_.CovarianceOf(newest);
     result.covariance = known.state;
     result.motion_covariance = known.motion;
+  }
+
+  /// Whether the inertial sensor has not measured what the images show for some frames, or, the
+  /// more it is off, for few.
+  bool InertialDisagrees(const WindowSummary& window) {
+    constexpr double kPatience = 5, kMost = 3;
+    const double excess = window.inertial_error / options_.max_inertial_error;
+    disagreement_ =
+        excess > 1 ? disagreement_ + std::min(excess, kMost) : std::max(0., disagreement_ - 1);
+    return disagreement_ >= kPatience;
+  }
+
+  void LeaveInertialOut(VioFrameResult& result) {
+    window_.DropInertial(HeldPose());
+    inertial_ = false;
+    disagreement_ = 0;
+    result.problem = InitialisationProblem::kMotionDisagrees;
+    start_.Refute(result.time_ns);
+  }
+
+  /// Whether the gyroscope may tell the next rotation before the sensor takes part: its unit or
+  /// axes may be wrong, and tracks would be searched where they are not.
+  void JudgeGyroscope(VioState state) {
+    if (state == VioState::kLost) {
+      gyro_fits_ = !gyro_fits_;  // so much for that
+      return;
+    }
+    const size_t count = window_.frames.size();
+    if (count < 2 || !Newest()->since_last) return;
+    const Eigen::Quaterniond turn =
+        window_.frames[count - 2].state.T_world_body.R.conjugate() * Newest()->state.T_world_body.R;
+    constexpr double kUnexplained = 0.3;  // of the turn
+    const double error = LogSO3(Newest()->since_last->delta_R().conjugate() * turn).norm();
+    gyro_fits_ = error < kUnexplained * LogSO3(turn).norm() +
+                             options_.start.max_gyro_bias * Newest()->since_last->dt_s();
   }
 
   /// Velocity from the last two poses, m/s.
@@ -388,8 +445,6 @@ class StereoInertialOdometry::Impl {
   /// A new map begins at the last believed state.
   void Lose() {
     for (const auto& [id, landmark] : window_.landmarks) finished_.push_back(ToPoint(landmark));
-    // Rates that were never verified may be why: in degrees they lead the flow astray.
-    doubts_gyro_ = !inertial_;
     Forget();
     ++segment_;
   }
@@ -474,11 +529,11 @@ class StereoInertialOdometry::Impl {
   Window window_;
   std::map<std::int64_t, std::vector<LandmarkSight>> tracks_;  ///< of the newest frame, by id
   std::vector<VioPoint> finished_;
-  static constexpr double kHeld = 1e-4;  ///< rad, m: standard deviation of what is held
   BodyState last_;
   Eigen::Quaterniond R_gravity_world_ = Eigen::Quaterniond::Identity();
-  bool inertial_ = false;  ///< the inertial sensor takes part
-  bool doubts_gyro_ = false;
+  bool inertial_ = false;    ///< the inertial sensor takes part
+  bool gyro_fits_ = true;    ///< its rotations are those of the images
+  double disagreement_ = 0;  ///< over the last frames, with what the images show
   InertialStart start_;
   int next_id_ = 0;
   int since_keyframe_ = 0;

@@ -37,6 +37,7 @@ struct VioOptions {
   double blind_s = 2;
   InertialInitializerOptions start;
   double start_s = 1;
+  double max_inertial_error = 1.5;
   bool covariance = true;
   int threads = 1;
 
@@ -57,6 +58,9 @@ struct VioOptions {
     visit("blind_s", blind_s, "s", "after so long without sight a new map is begun");
     visit("start", start, "", "when the inertial sensor takes part, which images alone begin");
     visit("start_s", start_s, "s", "of images alone before it is asked for the first time");
+    visit("max_inertial_error", max_inertial_error, "sigma",
+          "error of the inertial sensor against the images beyond which, if it stays, it is left "
+          "out until a later start");
     visit("covariance", covariance, "", "state the covariance of every frame");
     visit("threads", threads, "", "0 for all cores. The result does not depend on it");
   }
@@ -91,7 +95,7 @@ struct VioFrameResult {
   /// World coordinates to those of a world whose z points up exactly; identity until it is found.
   Eigen::Quaterniond R_gravity_world = Eigen::Quaterniond::Identity();
   bool inertial = false;  ///< the inertial sensor takes part
-  /// Why not, where it was asked.
+  /// Why not: at the frame where it is left out, and at those where it was asked in vain.
   InitialisationProblem problem = InitialisationProblem::kNone;
   /// Of the state, in the order of Plus(). Of velocity and biases 0 without inertial sensor.
   StateMatrix covariance = StateMatrix::Zero();

@@ -271,6 +271,20 @@ std::deque<InertialCost> InertialCosts(const Linearization& at, double gravity) 
   return costs;
 }
 
+/// RMS of the costs' residuals at the parameters as they are; 0 where there are none.
+double ErrorOf(const std::deque<InertialCost>& costs, const Linearization& at) {
+  double squares = 0;
+  for (const InertialCost& cost : costs) {
+    std::array<const double*, 4> parameters;
+    for (size_t k = 0; k < parameters.size(); ++k)
+      parameters[k] = at.x().data() + at.OffsetOf(cost.blocks()[k]);
+    Vector15 r;
+    cost.Evaluate(parameters.data(), r.data(), nullptr);
+    squares += r.squaredNorm() / 15;
+  }
+  return costs.empty() ? 0 : std::sqrt(squares / static_cast<double>(costs.size()));
+}
+
 ceres::Solver::Options SolverOptions(const WindowOptions& window) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
@@ -385,6 +399,15 @@ void Window::DropPrior() {
   for (Frame& frame : frames) frame.in_prior = false;
 }
 
+void Window::DropInertial(const Eigen::Matrix<double, kPoseParameters, 1>& sigmas) {
+  DropPrior();
+  for (Frame& frame : frames) {
+    frame.inertial = false;
+    frame.state = {.time_ns = frame.state.time_ns, .T_world_body = frame.state.T_world_body};
+  }
+  AnchorPose(frames.front(), sigmas);
+}
+
 WindowSummary Window::Refine() {
   Linearization at(frames);
   std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
@@ -429,6 +452,7 @@ WindowSummary Window::Refine() {
     at.x().segment(at.OffsetOf(at.blocks()[k]), parameters[k].size()) = parameters[k];
   visual.Settle();
   at.WriteBack();
+  summary.inertial_error = ErrorOf(inertial, at);
   for (const LandmarkItem& item : items) {
     item.landmark->ray = item.value.head<2>();
     item.landmark->inverse_depth = item.value.z();

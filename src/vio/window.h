@@ -83,6 +83,9 @@ struct WindowSummary {
   int sights = 0;    ///< that were kept
   int outliers = 0;  ///< that were taken out
   double cost = 0;   ///< of half the squared errors in deviations
+  /// RMS of the inertial sensor's errors in deviations: beyond 1 it did not measure what the images
+  /// show.
+  double inertial_error = 0;
   bool usable = false;
 };
 
@@ -126,6 +129,10 @@ class Window {
 
   /// Forgets all that was known before, to be anchored anew.
   void DropPrior();
+
+  /// Forgets all that the inertial sensor told: velocities, biases, and the prior. Poses stay where
+  /// they are; the oldest one is held by these deviations.
+  void DropInertial(const Eigen::Matrix<double, kPoseParameters, 1>& sigmas);
 
   /// Refines all frames and landmarks.
   WindowSummary Refine();

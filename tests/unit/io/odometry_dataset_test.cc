@@ -88,9 +88,10 @@ TEST_F(EurocOdometry, SkipsAndCountsFramesWithOneEye) {
   EXPECT_EQ(sequence.skipped_frames, 5) << "at 5, 20, 30, 40 and 50";
 }
 
-TEST_F(EurocOdometry, ReportsThatNoFrameHasBothItsFiles) {
+TEST_F(EurocOdometry, ReportsCamerasThatNeverLookTogether) {
   SetImages(1, {11});
-  EXPECT_EQ(OpenError(folder_), folder_.string() + ": has no frame with all its files; 4 lack one");
+  EXPECT_EQ(OpenError(folder_),
+            folder_.string() + ": cam0 and cam1 have no time in common: are they synchronised?");
 }
 
 TEST_F(EurocOdometry, MayHaveOneCamera) {

@@ -1,3 +1,5 @@
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include <sgf/vio/inertial_start.h>
@@ -38,11 +40,50 @@ TEST(InertialStart, SaysThatThereAreNoMeasurementsAndForgetsPosesFromBefore) {
   const ImuBuffer imu = RestingUntil(4);
   const auto found = start.Add(PoseAt(0.5), imu);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->problem, InitialisationProblem::kTooLittleData);
+  EXPECT_EQ(found->problem, InitialisationProblem::kGapInData);
   start.Add(PoseAt(1.5), imu);
   EXPECT_EQ(start.first_ns(), 1'500'000'000);
   start.Clear();
   EXPECT_FALSE(start.first_ns());
+}
+
+/// Asks at rest every 0.1 s. @return the answer to the last question.
+std::optional<InertialInitialisation> Rest(InertialStart& start, const ImuBuffer& imu,
+                                           double from_s, double to_s) {
+  std::optional<InertialInitialisation> found;
+  for (double t = from_s; t < to_s; t += 0.1) found = start.Add(PoseAt(t), imu);
+  return found;
+}
+
+TEST(InertialStart, AtRestDoesNotForgetWhatMotionHasShown) {
+  InertialStart start({}, 1, 3);
+  const ImuBuffer imu = RestingUntil(30);
+  ASSERT_TRUE(Rest(start, imu, 1, 2.5)->ok());
+  start.Clear();
+  // Images turn, the gyroscope does not.
+  std::optional<InertialInitialisation> found;
+  for (double t = 3; t < 5; t += 0.1) {
+    TimedPose pose = PoseAt(t);
+    pose.pose.R = ExpSO3({0, 0, std::sin(3 * t)});
+    found = start.Add(pose, imu);
+  }
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->problem, InitialisationProblem::kSensorAxes);
+  start.Clear();
+  EXPECT_EQ(Rest(start, imu, 6, 8)->problem, InitialisationProblem::kSensorAxes);
+}
+
+TEST(InertialStart, WaitsLongerEachTimeAfterItWasWrong) {
+  InertialStart start({}, 1, 3);
+  const ImuBuffer imu = RestingUntil(40);
+  start.Refute(1'000'000'000);
+  EXPECT_FALSE(Rest(start, imu, 1.1, 5.9));
+  const auto found = Rest(start, imu, 6.1, 8);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->problem, InitialisationProblem::kMotionDisagrees) << "rest is no reason";
+  start.Refute(10'000'000'000);
+  EXPECT_FALSE(Rest(start, imu, 10, 19.9));
+  EXPECT_TRUE(Rest(start, imu, 20.1, 22));
 }
 
 TEST(InertialStart, DoesNotTakeConstantVelocityForRest) {

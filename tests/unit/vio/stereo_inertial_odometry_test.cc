@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <ostream>
 #include <utility>
 #include <vector>
 
@@ -103,6 +105,7 @@ struct Ridden {
     const VioFrameResult& r = results.back();
     EXPECT_TRUE(Minus(r.body, {}).allFinite()) << k;
     EXPECT_TRUE(r.covariance.allFinite()) << k;
+    EXPECT_GE(r.covariance.diagonal().minCoeff(), 0) << k;
     EXPECT_EQ(r.time_ns, TimeOf(k));
     return r;
   }
@@ -196,6 +199,21 @@ TEST(StereoInertialOdometry, FollowsImagesAlone) {
   EXPECT_GT(flight.results.back().covariance(0, 0), 0);
 }
 
+TEST(StereoInertialOdometry, LooksAtTheSameImagesForLong) {
+  VioOptions options = Options();
+  options.inertial = false;
+  Ridden flight(options);
+  for (int k = 0; k < 300; ++k) {
+    flight.results.clear();
+    const std::int64_t time_ns = Flight::kStart_ns + k * kPeriod;
+    const VioFrameResult r =
+        flight.odometry.Process(time_ns, ImagesAt(0).first, ImagesAt(0).second);
+    EXPECT_EQ(r.state, VioState::kTracked) << k;
+    EXPECT_LT(r.body.T_world_body.p.norm(), 1e-3) << k;
+    EXPECT_GE(r.covariance.diagonal().minCoeff(), 0) << k << ": not more is known than can be";
+  }
+}
+
 TEST(StereoInertialOdometry, BeginsWithImagesAloneWhereTheSensorSaysNothing) {
   Ridden flight;
   for (int k = 0; k < 30; ++k) flight.Look(k);
@@ -242,6 +260,9 @@ TEST(StereoInertialOdometry, GoesOnAfterAGapOfTheSensor) {
   }
   ExpectTracked(flight, 0.06);
   EXPECT_EQ(flight.odometry.imu_health().gaps, 1);
+  EXPECT_TRUE(flight.results[34].inertial);
+  EXPECT_FALSE(flight.results[40].inertial);
+  EXPECT_EQ(flight.results[40].problem, InitialisationProblem::kGapInData);
   EXPECT_GT(flight.results[34].covariance(kVelocity, kVelocity), 0);
   EXPECT_EQ(flight.results[40].covariance(kVelocity, kVelocity), 0);
   const VioFrameResult& last = flight.results.back();
@@ -251,6 +272,105 @@ TEST(StereoInertialOdometry, GoesOnAfterAGapOfTheSensor) {
              truth.T_world_body.R.conjugate() * truth.velocity)
                 .norm(),
             0.1);
+}
+
+/// What an inertial sensor may do that it should not.
+struct WrongSensor {
+  const char* name;
+  void (*spoil)(ImuSample&);
+};
+
+void PrintTo(const WrongSensor& sensor, std::ostream* out) { *out << sensor.name; }
+
+class FlightWithWrong : public testing::TestWithParam<WrongSensor> {
+ protected:
+  /// @param from first frame of which the samples are wrong.
+  static Ridden Fly(int from) {
+    Ridden flight;
+    for (int k = 0; k < 70; ++k) {
+      flight.Feed(k, [&](ImuSample& sample) {
+        if (k >= from) GetParam().spoil(sample);
+        return true;
+      });
+      flight.Look(k);
+    }
+    return flight;
+  }
+
+  static bool SaysThatSomethingIsWrong(const Ridden& flight) {
+    return std::any_of(flight.results.begin(), flight.results.end(), [](const VioFrameResult& r) {
+      return r.problem != InitialisationProblem::kNone &&
+             r.problem != InitialisationProblem::kTooLittleData;
+    });
+  }
+};
+
+TEST_P(FlightWithWrong, SensorFromTheBeginningGoesOnWithImagesAlone) {
+  const Ridden flight = Fly(0);
+  EXPECT_TRUE(SaysThatSomethingIsWrong(flight));
+  EXPECT_FALSE(flight.results.back().inertial);
+  EXPECT_LE(flight.results.back().segment, 1) << "lost while the gyroscope led the flow, no more";
+  for (size_t k = kSettled; k < flight.results.size(); ++k) {
+    EXPECT_EQ(flight.results[k].state, VioState::kTracked) << k;
+    EXPECT_LT(MotionError(flight, kSettled, k), 0.3) << k;  // until it is noticed
+  }
+  EXPECT_LT(MotionError(flight, kSettled, flight.results.size() - 1), 0.04);
+}
+
+TEST_P(FlightWithWrong, SensorFromSomeTimeOnGoesOnWithImagesAlone) {
+  const Ridden flight = Fly(35);
+  EXPECT_TRUE(flight.results[34].inertial);
+  EXPECT_FALSE(flight.results.back().inertial);
+  EXPECT_TRUE(SaysThatSomethingIsWrong(flight));
+  for (size_t k = kSettled; k < flight.results.size(); ++k) {
+    EXPECT_EQ(flight.results[k].state, VioState::kTracked) << k;
+    EXPECT_LT(MotionError(flight, kSettled, k), 0.15) << k;
+  }
+  EXPECT_LT(MotionError(flight, kSettled, flight.results.size() - 1), 0.06);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sensors, FlightWithWrong,
+    testing::Values(WrongSensor{"AccelerationInG", [](ImuSample& s) { s.accel /= 9.81; }},
+                    WrongSensor{"Upside", [](ImuSample& s) { s.accel = -s.accel; }},
+                    WrongSensor{"LeftHanded",
+                                [](ImuSample& s) { s.gyro.y() *= -1, s.accel.y() *= -1; }},
+                    WrongSensor{"SwappedAxes",
+                                [](ImuSample& s) {
+                                  std::swap(s.gyro.x(), s.gyro.z()),
+                                      std::swap(s.accel.x(), s.accel.z());
+                                }},
+                    WrongSensor{"AccelerometerTurned",
+                                [](ImuSample& s) { s.accel.x() *= -1, s.accel.y() *= -1; }},
+                    WrongSensor{"Zero", [](ImuSample& s) { s.gyro.setZero(), s.accel.setZero(); }}),
+    [](const auto& sensor) { return sensor.param.name; });
+
+TEST(StereoInertialOdometry, DoesNotBeginWithAGyroscopeInDegrees) {
+  Ridden flight;
+  for (int k = 0; k < 50; ++k) {
+    flight.Feed(k, [](ImuSample& sample) { return sample.gyro *= 57.3, true; });
+    flight.Look(k);
+  }
+  // It may lead the flow astray once.
+  EXPECT_LE(flight.results.back().segment, 1);
+  int lost = 0;
+  for (const VioFrameResult& r : flight.results) lost += r.state == VioState::kLost;
+  EXPECT_LE(lost, 1);
+  EXPECT_FALSE(flight.results.back().inertial);
+  EXPECT_NE(flight.results.back().problem, InitialisationProblem::kNone);
+  EXPECT_LT(MotionError(flight, kSettled, 49), 0.04);
+}
+
+TEST(StereoInertialOdometry, LeavesOutASensorWithAnotherClock) {
+  for (const std::int64_t late_ns : {-200'000'000, 200'000'000}) {
+    Ridden flight;
+    for (int k = 0; k < 70; ++k) {
+      flight.Feed(k, [&](ImuSample& sample) { return sample.time_ns += late_ns, true; });
+      flight.Look(k);
+    }
+    EXPECT_FALSE(flight.results.back().inertial) << late_ns;
+    EXPECT_LT(MotionError(flight, kSettled, 69), 0.06) << late_ns;
+  }
 }
 
 TEST(StereoInertialOdometry, LeavesOutSamplesThatAreNone) {
@@ -438,6 +558,7 @@ TEST(StereoInertialOdometry, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refusal([](auto& o) { o.least_sights = 2; }), HasSubstr("least_sights"));
   EXPECT_THAT(refusal([](auto& o) { o.blind_s = -1; }), HasSubstr("blind_s"));
   EXPECT_THAT(refusal([](auto& o) { o.start_s = 0; }), HasSubstr("start_s"));
+  EXPECT_THAT(refusal([](auto& o) { o.max_inertial_error = 0; }), HasSubstr("max_inertial_error"));
   EXPECT_THAT(refusal([](auto& o) { o.threads = -1; }), HasSubstr("threads"));
   EXPECT_THAT(refusal([](auto& o) { o.window.sigma_px = 0; }), HasSubstr("window.sigma_px"));
   EXPECT_THAT(refusal([](auto& o) { o.flow.levels = 0; }), HasSubstr("flow.levels"));

@@ -133,6 +133,34 @@ TEST(Window, RecoversStatesFromNoisyMeasurements) {
   EXPECT_NEAR(2 * summary.cost / degrees, 1, 0.1);
 }
 
+TEST(Window, TellsWhetherTheInertialSensorMeasuredWhatTheImagesShow) {
+  SimulatedWindow simulated = MakeWindow(0.5);
+  Window& window = simulated.window;
+  for (int k = 0; k < 6; ++k) {
+    simulated.Push();
+    if (k == 0) Anchor(window.frames[0], AnchorSigmas(), window);
+  }
+  EXPECT_GT(window.Refine().inertial_error, 0);
+  EXPECT_LT(window.Refine().inertial_error, 1.2);
+  Flight upside = TestFlight(true);
+  for (ImuSample& sample : upside.samples) sample.accel = -sample.accel;
+  for (size_t k = 1; k < window.frames.size(); ++k)
+    window.frames[k].since_last =
+        upside.Integrate(SimulatedWindow::SampleOf(window.frames[k - 1].id),
+                         SimulatedWindow::SampleOf(window.frames[k].id), {});
+  EXPECT_GT(window.Refine().inertial_error, 2);
+
+  // Without it, the images have it right again.
+  window.DropInertial(AnchorSigmas().head<kPoseParameters>());
+  const WindowSummary alone = window.Refine();
+  EXPECT_EQ(alone.inertial_error, 0);
+  EXPECT_LT(ErrorsOf(simulated).position, 0.1);
+  for (const Frame& frame : window.frames) {
+    EXPECT_FALSE(frame.inertial);
+    EXPECT_EQ(frame.state.gyro_bias.norm(), 0);
+  }
+}
+
 TEST(Window, IsAtTheMinimumAfterTheDefaultsIterations) {
   // Tilt and biases are hard to tell apart, and must not lag behind for that.
   SimulatedWindow quick = MakeWindow(0.5, {.window = {}}), patient = MakeWindow(0.5);
