@@ -178,8 +178,14 @@ def _odometry_lines(path: Path, counted: str = "lost") -> list[str]:
     return lines
 
 
-def _trajectory_table_lines(path: Path) -> list[str]:
-    """Per condition what succeeds of all sequences together, then the errors of each."""
+def _trajectory_table_lines(path: Path, verdict_runs: int) -> list[str]:
+    """Where runs are enough, comparisons over all sequences together; then the errors of each."""
+    runs = pd.read_csv(path)["runs"].max()
+    if runs < verdict_runs:
+        return [
+            f"runs of each line: {runs}; comparisons take {verdict_runs} (tables/{path.stem}.md has what these say)",
+            *_odometry_lines(path, "failed"),
+        ]
     compared = pd.read_csv(path.with_name(f"{path.stem}_compared.csv"))
     lines = [
         f"{row.condition}, success by {row.rule} rule, {row.pairs} pairs of runs:"
@@ -241,7 +247,7 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
     if stage.kind == "trajectory_table":
-        return _trajectory_table_lines(main_file(stage, results))
+        return _trajectory_table_lines(main_file(stage, results), stage.verdict_runs)
     if stage.kind == "tuning":
         return _tuning_lines(main_file(stage, results))
     return []

@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 
 #include <fmt/core.h>
@@ -26,13 +27,17 @@ class Gain {
 
   double At(cv::Point2d pixel) const {
     const cv::Point2d from_centre = pixel - centre_;
-    const cv::Point2d from_light = (pixel - light_) / sigma_px_;
-    const double light = 1 + change_.light * std::exp(-0.5 * from_light.dot(from_light));
     const double r2 = from_centre.dot(from_centre) / corner2_;
-    return light * change_.exposure * (1 - change_.vignette * r2);
+    return LightAt(pixel) * change_.exposure * (1 - change_.vignette * r2);
   }
 
  private:
+  double LightAt(cv::Point2d pixel) const {
+    if (change_.light == 0) return 1;
+    const cv::Point2d from_light = (pixel - light_) / sigma_px_;
+    return 1 + change_.light * std::exp(-0.5 * from_light.dot(from_light));
+  }
+
   ImageChange change_;
   cv::Point2d centre_, light_;
   double corner2_, sigma_px_;
@@ -41,14 +46,32 @@ class Gain {
 // Keeps 0 and 255 as they are.
 double Curve(double level, double exponent) { return 255 * std::pow(level / 255, exponent); }
 
+// Stored levels to light. Without a blur they are whole numbers: a table saves the power of each.
+class ToLight {
+ public:
+  explicit ToLight(const ImageChange& change) : change_(change) {
+    for (size_t level = 0; level < table_.size(); ++level)
+      table_[level] = Curve(static_cast<double>(level), change.gamma);
+  }
+
+  double operator()(double level) const {
+    return change_.blur > 0 ? Curve(level, change_.gamma) : table_[static_cast<size_t>(level)];
+  }
+
+ private:
+  ImageChange change_;
+  std::array<double, 256> table_;
+};
+
 // What happens to light: between the two gammas. The channels of a pixel stand side by side.
 void ChangeLight(cv::Mat1d& levels, int channels, const ImageChange& change) {
   const Gain gain(cv::Size(levels.cols / channels, levels.rows), change);
   const bool curved = change.gamma != 1;
+  const ToLight to_light(change);
   for (int y = 0; y < levels.rows; ++y)
     for (int x = 0; x < levels.cols; ++x) {
       double& level = levels(y, x);
-      if (curved) level = Curve(level, change.gamma);
+      if (curved) level = to_light(level);
       level *= gain.At(cv::Point2d(x / channels, y));
       if (curved && change.encode) level = Curve(level, 1 / change.gamma);
     }

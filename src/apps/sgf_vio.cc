@@ -1,6 +1,7 @@
 // Stereo-inertial odometry.
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -256,6 +257,23 @@ void WriteCovariances(const fs::path& file, const Run& run) {
   WriteTextFile(file, text);
 }
 
+void WriteCalibration(const fs::path& file, const Run& run) {
+  std::string text =
+      "time_ns,time_offset_s,rx_rad,ry_rad,rz_rad,px_m,py_m,pz_m,sigma_time_offset_s,"
+      "sigma_rotation_rad,sigma_position_m\n";
+  for (const vio::VioFrameResult& f : run.frames) {
+    if (!HasState(f)) continue;
+    const auto& covariance = f.calibration_covariance;
+    const Eigen::Vector3d r = LogSO3(f.calibration.T_body_rig.R), &p = f.calibration.T_body_rig.p;
+    text += fmt::format(
+        "{},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.7g},{:.4g},{:.4g},{:.4g}\n", f.time_ns,
+        f.calibration.time_offset_s, r.x(), r.y(), r.z(), p.x(), p.y(), p.z(),
+        std::sqrt(covariance(6, 6)), std::sqrt(covariance.topLeftCorner<3, 3>().trace()),
+        std::sqrt(covariance.block<3, 3>(3, 3).trace()));
+  }
+  WriteTextFile(file, text);
+}
+
 void WriteTimings(const fs::path& file, const Run& run) {
   std::string text =
       "time_ns,pyramid_ms,tracking_ms,stereo_ms,detection_ms,flow_ms,refinement_ms,"
@@ -337,6 +355,7 @@ void RunVio(const Arguments& arguments, const OptionFlags& flags) {
   WriteTrajectory(folder / "trajectory.txt", Trajectory(run));
   WriteStates(folder / "states.csv", run);
   WriteCovariances(folder / "covariances.csv", run);
+  if (!options.odometry.calibration.IsHeld()) WriteCalibration(folder / "calibration.csv", run);
   WriteTimings(folder / "timings.csv", run);
   WriteRunOptions(folder / "options.yaml", WriteOptions(options));
   events.Close();
@@ -355,7 +374,8 @@ int main(int argc, char** argv) {
       "frame's "
       "time, as known then), states.csv (velocity, biases and deviations), "
       "covariances.csv, points.ply, "
-      "events.jsonl, timings.csv, summary.json and options.yaml.",
+      "events.jsonl, timings.csv, summary.json, options.yaml and, if it is estimated, "
+      "calibration.csv (the cameras' clock and place against the inertial sensor).",
       "sgf_vio");
   arguments.run.AddTo(app);
   app.add_flag("--real-time", arguments.real_time,

@@ -116,6 +116,13 @@ std::optional<Preintegration> ImuBuffer::Between(std::int64_t from_ns, std::int6
   return sum;
 }
 
+std::optional<Eigen::Vector3d> ImuBuffer::GyroAt(std::int64_t time_ns) const {
+  if (!Covers(time_ns, time_ns)) return std::nullopt;
+  const size_t i = IndexAt(time_ns);
+  if (samples_[i].time_ns == time_ns) return samples_[i].gyro;
+  return Interpolate(samples_[i], samples_[i + 1], time_ns).gyro;
+}
+
 void ImuBuffer::DropBefore(std::int64_t time_ns) {
   while (samples_.size() > 1 && samples_[1].time_ns <= time_ns) samples_.pop_front();
 }

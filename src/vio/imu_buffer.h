@@ -72,6 +72,10 @@ class ImuBuffer {
   std::optional<Preintegration> Between(std::int64_t from_ns, std::int64_t to_ns,
                                         const ImuBias& bias) const;
 
+  /// Angular rate as measured at a time, interpolated, rad/s; nothing where samples do not cover
+  /// it.
+  std::optional<Eigen::Vector3d> GyroAt(std::int64_t time_ns) const;
+
   /// Forgets what Between() does not need for times from `time_ns` on.
   void DropBefore(std::int64_t time_ns);
 

@@ -6,21 +6,31 @@
 
 #include <Eigen/Core>
 
+#include <sgf/vio/calibration.h>
+
 /// What is known of a window's frames from the measurements that have left it.
 namespace sgf::vio {
 
 inline constexpr int kPoseParameters = 6;    ///< rotation, position
 inline constexpr int kMotionParameters = 9;  ///< velocity, gyroscope's and accelerometer's bias
 
-/// A frame's pose or motion among the parameters, in the tangent of Plus(): differences from where
-/// it was linearised.
+enum class Part { kPose, kMotion, kCalibration };
+
+/// A frame's pose or motion, or the calibration, among the parameters, in the tangent of Plus():
+/// differences from where it was linearised.
 struct BlockId {
   int frame = 0;
-  bool motion = false;
+  Part part = Part::kPose;
 
-  int size() const { return motion ? kMotionParameters : kPoseParameters; }
+  int size() const {
+    return part == Part::kPose     ? kPoseParameters
+           : part == Part::kMotion ? kMotionParameters
+                                   : kCalibrationParameters;
+  }
   auto operator<=>(const BlockId&) const = default;
 };
+
+inline constexpr BlockId kCalibrationBlock{-1, Part::kCalibration};
 
 /// |S x + e|^2 / 2 in the parameters x of blocks, one after the other. Kept as a square root, so
 /// that numbers have half the digits of the normal equations' (Demmel et al., "Square root bundle

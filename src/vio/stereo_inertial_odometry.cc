@@ -38,6 +38,14 @@ void CheckOptions(const VioOptions& options) {
   require(options.start_s > 0, "start_s", options.start_s, "positive");
   require(options.max_inertial_error > 0, "max_inertial_error", options.max_inertial_error,
           "positive");
+  const CalibrationOptions& calibration = options.calibration;
+  constexpr double kMost_s = 0.05, kMost_rad = 0.2, kMost_m = 0.5;  // the start takes it as right
+  require(calibration.time_offset_sd_s >= 0 && calibration.time_offset_sd_s <= kMost_s,
+          "calibration.time_offset_sd_s", calibration.time_offset_sd_s, "from 0 to 0.05");
+  require(calibration.rotation_sd_rad >= 0 && calibration.rotation_sd_rad <= kMost_rad,
+          "calibration.rotation_sd_rad", calibration.rotation_sd_rad, "from 0 to 0.2");
+  require(calibration.position_sd_m >= 0 && calibration.position_sd_m <= kMost_m,
+          "calibration.position_sd_m", calibration.position_sd_m, "from 0 to 0.5");
   require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
@@ -142,6 +150,8 @@ class StereoInertialOdometry::Impl {
     if (!last) return frame;
     if (options_.inertial)
       frame.since_last = imu_.Between(last->state.time_ns, time_ns, BiasOf(last->state));
+    if (const auto gyro = options_.inertial ? imu_.GyroAt(time_ns) : std::nullopt)
+      frame.angular_velocity = *gyro - last->state.gyro_bias;
     const bool told = frame.since_last && TellsPose(*frame.since_last);
     if (frame.since_last && last->inertial) {
       frame.state = frame.since_last->Predict(last->state, options_.window.gravity);
@@ -236,11 +246,20 @@ class StereoInertialOdometry::Impl {
     Eigen::Matrix<double, kMotionParameters, 1> motion;
     motion << Vector3d::Constant(kVelocitySigma), found.gyro_bias_sd, found.accel_bias_sd;
     window_.AnchorMotion(window_.frames[first], motion);
+    if (!options_.calibration.IsHeld()) window_.AnchorCalibration(CalibrationSigmas());
     inertial_ = true;
     disagreement_ = 0;
     start_.Clear();
     R_gravity_world_ = found.T_world_visual.R * R_gravity_world_;
     last_ = window_.frames.back().state;
+  }
+
+  CalibrationVector CalibrationSigmas() const {
+    CalibrationVector sigmas;
+    sigmas << Vector3d::Constant(options_.calibration.rotation_sd_rad),
+        Vector3d::Constant(options_.calibration.position_sd_m),
+        options_.calibration.time_offset_sd_s;
+    return sigmas;
   }
 
   /// After a gap of the inertial sensor: the last frame has a velocity again, from where it was
@@ -376,10 +395,12 @@ class StereoInertialOdometry::Impl {
     if (!first)
       result.motion = std::prev(window_.frames.end(), 2)->state.T_world_body.Inverse() *
                       newest.state.T_world_body;
+    result.calibration = window_.calibration();
     if (!options_.covariance) return;
     const FrameCovariance known = window_.CovarianceOf(newest);
     result.covariance = known.state;
     result.motion_covariance = known.motion;
+    result.calibration_covariance = known.calibration;
   }
 
   /// Whether the inertial sensor has not measured what the images show for some frames, or, the
@@ -450,7 +471,9 @@ class StereoInertialOdometry::Impl {
   }
 
   void Forget() {
+    const Calibration calibration = window_.calibration();
     window_ = Window(window_.rig(), options_.window, options_.threads);
+    window_.SetCalibration(calibration);
     tracks_.clear();
     start_.Clear();
     inertial_ = false;

@@ -14,6 +14,7 @@
 #include <sgf/core/inertial.h>
 #include <sgf/core/se3.h>
 #include <sgf/flow/stereo_flow.h>
+#include <sgf/vio/calibration.h>
 #include <sgf/vio/imu_buffer.h>
 #include <sgf/vio/inertial_initializer.h>
 #include <sgf/vio/window.h>
@@ -38,6 +39,7 @@ struct VioOptions {
   InertialInitializerOptions start;
   double start_s = 1;
   double max_inertial_error = 1.5;
+  CalibrationOptions calibration;
   bool covariance = true;
   int threads = 1;
 
@@ -61,6 +63,8 @@ struct VioOptions {
     visit("max_inertial_error", max_inertial_error, "sigma",
           "error of the inertial sensor against the images beyond which, if it stays, it is left "
           "out until a later start");
+    visit("calibration", calibration, "",
+          "estimate of what the cameras are off by against the inertial sensor");
     visit("covariance", covariance, "", "state the covariance of every frame");
     visit("threads", threads, "", "0 for all cores. The result does not depend on it");
   }
@@ -106,6 +110,10 @@ struct VioFrameResult {
   /// Of the motion, in the order of Plus().
   Eigen::Matrix<double, kPoseParameters, kPoseParameters> motion_covariance =
       Eigen::Matrix<double, kPoseParameters, kPoseParameters>::Zero();
+  /// Where the cameras and their clock are against the inertial sensor: as estimated while
+  /// VioOptions::calibration says so and the sensor takes part; its covariance is 0 otherwise.
+  Calibration calibration = {};
+  CalibrationMatrix calibration_covariance = CalibrationMatrix::Zero();
   bool new_keyframe = false;
   int tracks = 0, stereo_tracks = 0;
   int landmarks = 0;  ///< seen in this frame

@@ -19,16 +19,21 @@ using Eigen::Index, Eigen::Matrix3d, Eigen::MatrixXd, Eigen::VectorXd;
 using Matrix15 = Eigen::Matrix<double, 15, 15>;
 using Vector15 = Eigen::Matrix<double, 15, 1>;
 
-/// A window's frames and landmarks as parameters: differences from where they are linearised.
+/// A window's frames and calibration as parameters: differences from where they are linearised.
 class Linearization {
  public:
-  explicit Linearization(std::deque<Frame>& frames) : frames_(frames) {
+  /// @param calibrates whether the calibration is estimated; else it is taken as it is.
+  Linearization(std::deque<Frame>& frames, const CalibrationEstimate& calibration, bool calibrates)
+      : frames_(frames), calibration_(calibration), calibrates_(calibrates) {
     for (Frame& frame : frames) {
       if (!frame.in_prior) frame.linearization = frame.state;
-      blocks_.push_back({frame.id, false});
+      blocks_.push_back({frame.id, Part::kPose});
+      velocities_.push_back({frame.state.velocity, frame.angular_velocity});
     }
+    if (calibrates) blocks_.push_back(kCalibrationBlock);
+    visual_blocks_ = blocks_.size();
     for (const Frame& frame : frames)
-      if (frame.inertial) blocks_.push_back({frame.id, true});
+      if (frame.inertial) blocks_.push_back({frame.id, Part::kMotion});
     Index size = 0;
     for (const BlockId block : blocks_) {
       offsets_.push_back(size);
@@ -37,14 +42,24 @@ class Linearization {
     x_.setZero(size);
     for (const Frame& frame : frames)
       if (frame.in_prior) SetParameters(frame.id, Minus(frame.state, frame.linearization));
+    if (calibrates)
+      x_.segment<kCalibrationParameters>(OffsetOf(kCalibrationBlock)) =
+          Minus(calibration.value, calibration.linearization);
     poses_.resize(frames.size());
     UpdatePoses();
   }
 
   std::deque<Frame>& frames() const { return frames_; }
   const std::vector<BlockId>& blocks() const { return blocks_; }
+  /// Those that say where the cameras see the landmarks: poses, calibration. They come first.
+  std::span<const BlockId> visual_blocks() const { return {blocks_.data(), visual_blocks_}; }
+  Index visual_size() const {
+    return kPoseParameters * static_cast<Index>(frames_.size()) +
+           (calibrates_ ? kCalibrationParameters : 0);
+  }
   VectorXd& x() { return x_; }
   const VectorXd& x() const { return x_; }
+  /// Of the body as the cameras see it.
   std::span<const PoseState> poses() const { return poses_; }
 
   Index OffsetOf(BlockId block) const {
@@ -67,8 +82,8 @@ class Linearization {
   }
 
   BodyState StateOf(const Frame& frame) const {
-    return StateAt(frame, x_.data() + OffsetOf({frame.id, false}),
-                   frame.inertial ? x_.data() + OffsetOf({frame.id, true}) : nullptr);
+    return StateAt(frame, x_.data() + OffsetOf({frame.id, Part::kPose}),
+                   frame.inertial ? x_.data() + OffsetOf({frame.id, Part::kMotion}) : nullptr);
   }
 
   /// Derivatives by the parameters are those by the local tangent times this, for the rotation.
@@ -77,12 +92,37 @@ class Linearization {
   }
 
   void UpdatePoses() {
+    const Calibration now = CalibrationNow();
     for (size_t k = 0; k < frames_.size(); ++k) {
-      const double* pose = x_.data() + offsets_[k];  // poses come first
-      const SE3 T = StateAt(frames_[k], pose, nullptr).T_world_body;
-      poses_[k] = {T, frames_[k].in_prior ? frames_[k].linearization.T_world_body : T,
-                   TurnOf(frames_[k], Eigen::Map<const Eigen::Vector3d>(pose))};
+      poses_[k] = PoseAt(k);
+      if (!IsSeenElsewhere()) continue;
+      poses_[k] = {AsSeen(poses_[k].T_world_body, velocities_[k], now),
+                   AsSeen(poses_[k].linearization, velocities_[k], LinearCalibration())};
     }
+  }
+
+  /// Derivatives of poses() by all visual parameters; empty where they are these parameters.
+  MatrixXd JacobianOfPoses() const {
+    if (!IsSeenElsewhere()) return {};
+    constexpr int n = kPoseParameters;
+    MatrixXd J = MatrixXd::Zero(n * static_cast<Index>(frames_.size()), visual_size());
+    for (size_t k = 0; k < frames_.size(); ++k) {
+      const PoseState pose = PoseAt(k);
+      AsSeenJacobian seen =
+          JacobianOfAsSeen(pose.linearization, velocities_[k], LinearCalibration());
+      seen.by_pose.leftCols<3>() *= pose.turn;
+      const Index at = n * static_cast<Index>(k);
+      J.block<n, n>(at, at) = seen.by_pose;
+      if (calibrates_)
+        J.block<n, kCalibrationParameters>(at, n * frames_.size()) = seen.by_calibration;
+    }
+    return J;
+  }
+
+  Calibration CalibrationNow() const {
+    if (!calibrates_) return calibration_.value;
+    return Plus(calibration_.linearization,
+                x_.segment<kCalibrationParameters>(OffsetOf(kCalibrationBlock)));
   }
 
   void WriteBack() {
@@ -94,15 +134,35 @@ class Linearization {
   }
 
  private:
+  /// Of the body itself.
+  PoseState PoseAt(size_t k) const {
+    const double* pose = x_.data() + offsets_[k];  // poses come first
+    const SE3 T = StateAt(frames_[k], pose, nullptr).T_world_body;
+    return {T, frames_[k].in_prior ? frames_[k].linearization.T_world_body : T,
+            TurnOf(frames_[k], Eigen::Map<const Eigen::Vector3d>(pose))};
+  }
+
+  /// Whether the cameras see the body elsewhere than the rig and the time stamps say.
+  bool IsSeenElsewhere() const { return calibrates_ || !calibration_.value.IsIdentity(); }
+
+  /// While it is estimated, the prior knows it.
+  const Calibration& LinearCalibration() const {
+    return calibrates_ ? calibration_.linearization : calibration_.value;
+  }
+
   void SetParameters(int id, const Vector15& delta) {
-    x_.segment<kPoseParameters>(OffsetOf({id, false})) = delta.head<kPoseParameters>();
-    if (const BlockId motion{id, true};
+    x_.segment<kPoseParameters>(OffsetOf({id, Part::kPose})) = delta.head<kPoseParameters>();
+    if (const BlockId motion{id, Part::kMotion};
         std::find(blocks_.begin(), blocks_.end(), motion) != blocks_.end())
       x_.segment<kMotionParameters>(OffsetOf(motion)) = delta.tail<kMotionParameters>();
   }
 
   std::deque<Frame>& frames_;
+  const CalibrationEstimate& calibration_;
+  bool calibrates_;
+  std::vector<BodyVelocity> velocities_;
   std::vector<BlockId> blocks_;
+  size_t visual_blocks_ = 0;
   std::vector<Index> offsets_;
   VectorXd x_;
   std::vector<PoseState> poses_;
@@ -122,26 +182,28 @@ std::vector<LandmarkItem> ItemsOf(const Linearization& at,
   return items;
 }
 
-/// Landmarks as a cost function of all poses. They follow the poses: they are where the
-/// linearisation has its minimum for them, so that the solver has a small dense problem. Residuals
-/// are the square root of the reduced equations and one more that makes up for the rest of the
-/// cost.
+/// Landmarks as a cost function of all poses and of the calibration. They follow the poses: they
+/// are where the linearisation has its minimum for them, so that the solver has a small dense
+/// problem. Residuals are the square root of the reduced equations and one more that makes up for
+/// the rest of the cost.
 class VisualCost : public ceres::CostFunction {
  public:
   VisualCost(const VisualEquations& equations, Linearization& at, std::vector<LandmarkItem>& items)
       : equations_(equations), at_(at), items_(items) {
-    mutable_parameter_block_sizes()->assign(at.frames().size(), kPoseParameters);
-    set_num_residuals(kPoseParameters * static_cast<int>(at.frames().size()) + 1);
-    linear_x_ = Poses();
+    for (const BlockId block : at.visual_blocks())
+      mutable_parameter_block_sizes()->push_back(block.size());
+    set_num_residuals(static_cast<int>(at.visual_size()) + 1);
+    linear_x_ = Parameters();
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    const int n = kPoseParameters * static_cast<int>(at_.frames().size());
-    for (size_t k = 0; k < at_.frames().size(); ++k)
-      std::copy_n(parameters[k], kPoseParameters, at_.x().data() + kPoseParameters * k);
-    at_.UpdatePoses();
-    if (linearized_) equations_.MoveLandmarks(Poses() - linear_x_, items_);
+    const auto blocks = at_.visual_blocks();
+    const Index n = at_.visual_size();
+    Index column = 0;
+    for (size_t k = 0; k < blocks.size(); column += blocks[k++].size())
+      std::copy_n(parameters[k], blocks[k].size(), at_.x().data() + column);
+    Settle();
     Eigen::Map<VectorXd> r(residuals, num_residuals());
     r.setZero();
     if (!jacobians) {
@@ -150,37 +212,43 @@ class VisualCost : public ceres::CostFunction {
     }
     ReducedEquations reduced;
     const double cost = equations_.Linearize(at_.poses(), items_, reduced);
-    linear_x_ = Poses();
+    by_parameters_ = at_.JacobianOfPoses();
+    if (by_parameters_.size() > 0) {
+      reduced.H = by_parameters_.transpose() * reduced.H * by_parameters_;
+      reduced.b = by_parameters_.transpose() * reduced.b;
+    }
+    linear_x_ = Parameters();
     linearized_ = true;
     const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
     r.head(root.e.size()) = root.e;
     r(n) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
-    for (size_t k = 0; k < at_.frames().size(); ++k) {
+    column = 0;
+    for (size_t k = 0; k < blocks.size(); column += blocks[k++].size()) {
       if (!jacobians[k]) continue;
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kPoseParameters, Eigen::RowMajor>;
-      Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), kPoseParameters);
+      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+      Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), blocks[k].size());
       J.setZero();
-      J.topRows(root.S.rows()) =
-          root.S.middleCols<kPoseParameters>(kPoseParameters * static_cast<Index>(k));
+      J.topRows(root.S.rows()) = root.S.middleCols(column, blocks[k].size());
     }
     return std::isfinite(cost);
   }
 
-  /// Landmarks where they belong for the poses as they are.
-  void Settle() {
+  /// Landmarks where they belong for the parameters as they are.
+  void Settle() const {
     at_.UpdatePoses();
-    if (linearized_) equations_.MoveLandmarks(Poses() - linear_x_, items_);
+    if (!linearized_) return;
+    const VectorXd step = Parameters() - linear_x_;
+    equations_.MoveLandmarks(by_parameters_.size() > 0 ? by_parameters_ * step : step, items_);
   }
 
  private:
-  VectorXd Poses() const {
-    return at_.x().head(kPoseParameters * static_cast<Index>(at_.frames().size()));
-  }
+  VectorXd Parameters() const { return at_.x().head(at_.visual_size()); }
 
   const VisualEquations& equations_;
   Linearization& at_;
   std::vector<LandmarkItem>& items_;
   mutable VectorXd linear_x_;  // Ceres takes cost functions as constant
+  mutable MatrixXd by_parameters_;
   mutable bool linearized_ = false;
 };
 
@@ -196,7 +264,10 @@ class InertialCost : public ceres::SizedCostFunction<15, kPoseParameters, kMotio
         weight_(to.since_last->SquareRootInformation()) {}
 
   std::array<BlockId, 4> blocks() const {
-    return {{{from_.id, false}, {from_.id, true}, {to_.id, false}, {to_.id, true}}};
+    return {{{from_.id, Part::kPose},
+             {from_.id, Part::kMotion},
+             {to_.id, Part::kPose},
+             {to_.id, Part::kMotion}}};
   }
 
   bool Evaluate(double const* const* parameters, double* residuals,
@@ -327,18 +398,17 @@ void AddLandmarks(const VisualEquations& equations, Linearization& at,
                   std::map<std::int64_t, Landmark>& landmarks, SquareRootPrior& prior) {
   if (landmarks.empty()) return;
   std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
-  std::vector<BlockId> blocks;
-  for (const Frame& frame : at.frames()) blocks.push_back({frame.id, false});
+  const auto blocks = at.visual_blocks();
   const SquareRoot rows = RowsOf(VisualCost(equations, at, items), blocks, at);
   std::vector<BlockId> touched;
   MatrixXd S(rows.S.rows(), 0);
-  for (size_t k = 0; k < blocks.size(); ++k) {
-    const auto columns =
-        rows.S.middleCols<kPoseParameters>(kPoseParameters * static_cast<Index>(k));
+  for (Index column = 0; const BlockId block : blocks) {
+    const auto columns = rows.S.middleCols(column, block.size());
+    column += block.size();
     if (columns.squaredNorm() == 0) continue;
-    touched.push_back(blocks[k]);
-    S.conservativeResize(Eigen::NoChange, S.cols() + kPoseParameters);
-    S.rightCols<kPoseParameters>() = columns;
+    touched.push_back(block);
+    S.conservativeResize(Eigen::NoChange, S.cols() + block.size());
+    S.rightCols(block.size()) = columns;
   }
   prior.Add(touched, S, rows.e);
 }
@@ -371,13 +441,18 @@ const Frame* Window::Find(int id) const {
 Frame* Window::Find(int id) { return const_cast<Frame*>(std::as_const(*this).Find(id)); }
 
 SE3 Window::PoseOf(const Frame& frame, int camera) const {
-  return frame.state.T_world_body * rig_.T_body_cam[camera];
+  const SE3& T_world_body = frame.state.T_world_body;
+  return (calibration().IsIdentity()
+              ? T_world_body
+              : AsSeen(T_world_body, {frame.state.velocity, frame.angular_velocity},
+                       calibration())) *
+         rig_.T_body_cam[camera];
 }
 
 void Window::AnchorPose(Frame& frame, const Eigen::Matrix<double, kPoseParameters, 1>& sigmas) {
   frame.linearization = frame.state;
   frame.in_prior = true;
-  const BlockId block{frame.id, false};
+  const BlockId block{frame.id, Part::kPose};
   MatrixXd S = sigmas.cwiseInverse().asDiagonal();
   S.topLeftCorner<3, 3>() *= frame.state.T_world_body.R.toRotationMatrix();
   prior_.Add(std::span(&block, 1), S, VectorXd::Zero(kPoseParameters));
@@ -389,9 +464,17 @@ void Window::AnchorMotion(Frame& frame, const Eigen::Matrix<double, kMotionParam
   frame.linearization.gyro_bias = frame.state.gyro_bias;
   frame.linearization.accel_bias = frame.state.accel_bias;
   frame.inertial = frame.in_prior = true;
-  const BlockId motion{frame.id, true};
+  const BlockId motion{frame.id, Part::kMotion};
   prior_.Add(std::span(&motion, 1), MatrixXd(sigmas.cwiseInverse().asDiagonal()),
              VectorXd::Zero(kMotionParameters));
+}
+
+void Window::AnchorCalibration(const CalibrationVector& sigmas) {
+  constexpr double kHeld = 1e-9;  // rad, m, s
+  calibration_.linearization = calibration_.value;
+  prior_.Add(std::span(&kCalibrationBlock, 1),
+             MatrixXd(sigmas.cwiseMax(kHeld).cwiseInverse().asDiagonal()),
+             VectorXd::Zero(kCalibrationParameters));
 }
 
 void Window::DropPrior() {
@@ -404,12 +487,13 @@ void Window::DropInertial(const Eigen::Matrix<double, kPoseParameters, 1>& sigma
   for (Frame& frame : frames) {
     frame.inertial = false;
     frame.state = {.time_ns = frame.state.time_ns, .T_world_body = frame.state.T_world_body};
+    frame.angular_velocity.setZero();
   }
   AnchorPose(frames.front(), sigmas);
 }
 
 WindowSummary Window::Refine() {
-  Linearization at(frames);
+  Linearization at(frames, calibration_, calibrates());
   std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
   const VisualEquations equations(rig_, options_, threads_);
   std::vector<VectorXd> parameters;
@@ -424,9 +508,9 @@ WindowSummary Window::Refine() {
   for (size_t k = 0; k < parameters.size(); ++k)
     problem.AddParameterBlock(parameters[k].data(), at.blocks()[k].size());
   VisualCost visual(equations, at, items);
-  std::vector<double*> poses;
-  for (const Frame& frame : frames) poses.push_back(pointer.at({frame.id, false}));
-  problem.AddResidualBlock(&visual, nullptr, poses);
+  std::vector<double*> seen;
+  for (const BlockId block : at.visual_blocks()) seen.push_back(pointer.at(block));
+  problem.AddResidualBlock(&visual, nullptr, seen);
   std::deque<InertialCost> inertial = InertialCosts(at, options_.gravity);
   for (InertialCost& cost : inertial) {
     std::vector<double*> blocks;
@@ -452,6 +536,7 @@ WindowSummary Window::Refine() {
     at.x().segment(at.OffsetOf(at.blocks()[k]), parameters[k].size()) = parameters[k];
   visual.Settle();
   at.WriteBack();
+  calibration_.value = at.CalibrationNow();
   summary.inertial_error = ErrorOf(inertial, at);
   for (const LandmarkItem& item : items) {
     item.landmark->ray = item.value.head<2>();
@@ -463,7 +548,7 @@ WindowSummary Window::Refine() {
 }
 
 int Window::RemoveOutliers() {
-  const Linearization at(frames);
+  const Linearization at(frames, calibration_, calibrates());
   const std::vector<LandmarkItem> items = ItemsOf(at, landmarks);
   const VisualEquations equations(rig_, options_, threads_);
   int outliers = 0;
@@ -491,7 +576,7 @@ void Window::Marginalize(std::span<const int> leaving, std::span<const int> moti
   const auto slows = [&](int id) {
     return leaves(id) || std::find(motions.begin(), motions.end(), id) != motions.end();
   };
-  Linearization at(frames);
+  Linearization at(frames, calibration_, calibrates());
   std::map<std::int64_t, Landmark> hosted;
   for (const auto& [id, landmark] : landmarks)
     if (leaves(landmark.host)) hosted.emplace(id, landmark);
@@ -504,11 +589,12 @@ void Window::Marginalize(std::span<const int> leaving, std::span<const int> moti
     Find(blocks[2].frame)->since_last.reset();
   }
   for (Frame& frame : frames)
-    if (prior_.Has({frame.id, false}) || prior_.Has({frame.id, true})) frame.in_prior = true;
+    if (prior_.Has({frame.id, Part::kPose}) || prior_.Has({frame.id, Part::kMotion}))
+      frame.in_prior = true;
 
   std::vector<BlockId> gone;
-  for (const int id : leaving) gone.insert(gone.end(), {{id, false}, {id, true}});
-  for (const int id : motions) gone.push_back({id, true});
+  for (const int id : leaving) gone.insert(gone.end(), {{id, Part::kPose}, {id, Part::kMotion}});
+  for (const int id : motions) gone.push_back({id, Part::kMotion});
   prior_.Marginalize(gone);
   for (const int id : motions) Find(id)->inertial = false;
   std::erase_if(frames, [&](const Frame& frame) { return leaves(frame.id); });
@@ -541,12 +627,14 @@ MotionJacobian JacobianOfMotion(const SE3& before, const SE3& now) {
 FrameCovariance Window::CovarianceOf(const Frame& frame) const {
   std::deque<Frame> copy = frames;
   std::map<std::int64_t, Landmark> seen = landmarks;
-  Linearization at(copy);
+  Linearization at(copy, calibration_, calibrates());
   std::vector<LandmarkItem> items = ItemsOf(at, seen);
   const VisualEquations equations(rig_, options_, threads_);
   MatrixXd H = MatrixXd::Zero(at.x().size(), at.x().size());
   ReducedEquations reduced;
   equations.Linearize(at.poses(), items, reduced);
+  if (const MatrixXd J = at.JacobianOfPoses(); J.size() > 0)
+    reduced.H = J.transpose() * reduced.H * J;
   H.topLeftCorner(reduced.H.rows(), reduced.H.cols()) = reduced.H;
   const auto add = [&](std::span<const BlockId> blocks, const MatrixXd& S) {
     Index row = 0;
@@ -570,10 +658,15 @@ FrameCovariance Window::CovarianceOf(const Frame& frame) const {
                            scaled.ldlt().solve(MatrixXd::Identity(H.rows(), H.cols())) *
                            unit.asDiagonal();
   FrameCovariance covariance;
-  const Index pose = at.OffsetOf({frame.id, false});
+  if (calibrates()) {
+    const Index at_calibration = at.OffsetOf(kCalibrationBlock);
+    covariance.calibration = inverse.block<kCalibrationParameters, kCalibrationParameters>(
+        at_calibration, at_calibration);
+  }
+  const Index pose = at.OffsetOf({frame.id, Part::kPose});
   covariance.state.topLeftCorner<6, 6>() = inverse.block<6, 6>(pose, pose);
   if (frame.inertial) {
-    const Index motion = at.OffsetOf({frame.id, true});
+    const Index motion = at.OffsetOf({frame.id, Part::kMotion});
     covariance.state.bottomRightCorner<9, 9>() = inverse.block<9, 9>(motion, motion);
     covariance.state.topRightCorner<6, 9>() = inverse.block<6, 9>(pose, motion);
     covariance.state.bottomLeftCorner<9, 6>() = inverse.block<9, 6>(motion, pose);
@@ -582,7 +675,7 @@ FrameCovariance Window::CovarianceOf(const Frame& frame) const {
   const Frame& before = *std::prev(
       std::find_if(frames.begin(), frames.end(), [&](const Frame& f) { return f.id == frame.id; }));
   const MotionJacobian J = JacobianOfMotion(before.state.T_world_body, frame.state.T_world_body);
-  const std::array poses = {at.OffsetOf({before.id, false}), pose};
+  const std::array poses = {at.OffsetOf({before.id, Part::kPose}), pose};
   for (int i = 0; i < 2; ++i)
     for (int j = 0; j < 2; ++j)
       covariance.motion += J.middleCols<6>(6 * i) * inverse.block<6, 6>(poses[i], poses[j]) *

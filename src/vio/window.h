@@ -11,6 +11,7 @@
 
 #include <sgf/core/inertial.h>
 #include <sgf/core/se3.h>
+#include <sgf/vio/calibration.h>
 #include <sgf/vio/preintegration.h>
 #include <sgf/vio/prior.h>
 
@@ -28,6 +29,7 @@ struct Frame {
   bool in_prior = false;
   bool inertial = false;  ///< velocity and biases are estimated as well
   bool keyframe = false;
+  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();  ///< of the body, rad/s
   /// What the inertial sensor has measured since the frame before, which is the one before in the
   /// window.
   std::optional<Preintegration> since_last = std::nullopt;
@@ -96,6 +98,14 @@ struct FrameCovariance {
   /// Of the pose in coordinates of the frame before, in the same order; 0 for the oldest frame.
   Eigen::Matrix<double, kPoseParameters, kPoseParameters> motion =
       Eigen::Matrix<double, kPoseParameters, kPoseParameters>::Zero();
+  /// Of the calibration; 0 where it is not estimated.
+  CalibrationMatrix calibration = CalibrationMatrix::Zero();
+};
+
+/// What the cameras' calibration against the inertial sensor is estimated with.
+struct CalibrationEstimate {
+  Calibration value;
+  Calibration linearization;  ///< where derivatives are taken
 };
 
 /// Frames, oldest first, landmarks by their track's id, and what is known from before. Same bits
@@ -115,7 +125,9 @@ class Window {
   const WindowOptions& options() const { return options_; }
   const SquareRootPrior& prior() const { return prior_; }
 
-  /// T_world_cam of a frame's camera, as it is now.
+  const Calibration& calibration() const { return calibration_.value; }
+
+  /// T_world_cam of a frame's camera, as it is now, with what the calibration is off by.
   SE3 PoseOf(const Frame& frame, int camera) const;
 
   /// Holds a frame's pose to what it is now, with standard deviations of rotations (rad) about the
@@ -126,6 +138,12 @@ class Window {
   /// Makes a frame inertial and holds its motion, as it is now, with standard deviations of
   /// velocity and biases.
   void AnchorMotion(Frame& frame, const Eigen::Matrix<double, kMotionParameters, 1>& sigmas);
+
+  /// Sets the calibration and, with standard deviations of it, has it estimated until the prior is
+  /// dropped. One that is 0 is held.
+  void SetCalibration(const Calibration& calibration) { calibration_ = {calibration, calibration}; }
+  void AnchorCalibration(const CalibrationVector& sigmas);
+  bool calibrates() const { return prior_.Has(kCalibrationBlock); }
 
   /// Forgets all that was known before, to be anchored anew.
   void DropPrior();
@@ -149,6 +167,7 @@ class Window {
   FrameCovariance CovarianceOf(const Frame& frame) const;
 
  private:
+  CalibrationEstimate calibration_;
   VioRig rig_;
   WindowOptions options_;
   int threads_ = 1;

@@ -140,6 +140,19 @@ def test_tracks_a_sequence(whole, tmp_path):
     assert {path.name for path in out.iterdir()} == found | about
 
 
+def test_calibration_is_written_when_it_is_estimated(whole, tmp_path):
+    out = tmp_path / "out"
+    track(whole, out, "--calibration.time-offset-sd-s", "0.01", "--start-s", "0.2")
+    expect_slide(out)
+    header, *rows = (out / "calibration.csv").read_text().splitlines()
+    assert header.startswith("time_ns,time_offset_s,rx_rad") and len(rows) == FRAMES
+    last = dict(zip(header.split(","), map(float, rows[-1].split(",")), strict=True))
+    assert abs(last["time_offset_s"]) <= 0.02 and 0 <= last["sigma_time_offset_s"] <= 0.01 + 1e-6
+    assert last["sigma_rotation_rad"] < 1e-6  # taken as right
+    refused = run("sgf_vio", whole, "-o", tmp_path / "no", "--calibration.time-offset-sd-s", "1")
+    assert refused.returncode == 2 and "calibration.time_offset_sd_s" in refused.stderr
+
+
 def test_is_the_same_for_any_number_of_threads(whole, tmp_path):
     for threads in ("1", "2"):
         track(whole, tmp_path / threads, "--threads", threads)

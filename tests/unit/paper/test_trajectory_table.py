@@ -1,6 +1,7 @@
 """Table III: what is run, what counts as success, and what stands beside the paper's values."""
 
 import copy
+import dataclasses
 import math
 from pathlib import Path
 
@@ -223,7 +224,11 @@ def test_files_and_summary_show_what_failed(study, raw, tmp_path):
     every = pd.read_csv(tables / "table3_dso_runs.csv")
     assert len(every) == 32 and every["failed"].sum() == 4 * (2 + 1)
     assert list(every["first_frame"].unique()) == [study.first_frame(run) for run in range(4)]
-    said = [line.strip() for line in summary.stage_lines(study, tmp_path, 0)[1:]]
+    few = [line.strip() for line in summary.stage_lines(study, tmp_path, 0)[1:]]
+    assert few[0].startswith("runs of each line: 4; comparisons take 10 (tables/table3_dso.md")
+    enough = dataclasses.replace(study, verdict_runs=4)
+    said = [line.strip() for line in summary.stage_lines(enough, tmp_path, 0)[1:]]
+    assert said[-len(few) + 1 :] == few[1:]
     assert said[2].startswith(
         "light, success by scale rule, 8 pairs of runs: sgf 6, photo 4, difference +25 [+0, "
     )

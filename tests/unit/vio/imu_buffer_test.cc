@@ -68,6 +68,18 @@ TEST(ImuBuffer, CoversWhatItsSamplesReach) {
   EXPECT_TRUE(std::isinf(buffer.LongestGap_s(0, 1001 * kMs)));
 }
 
+TEST(ImuBuffer, TellsTheAngularRateAtATime) {
+  ImuBuffer buffer{ImuNoise()};
+  EXPECT_FALSE(buffer.GyroAt(0));
+  buffer.Add({.time_ns = 0, .gyro = {1, 0, 0}, .accel = {0, 0, 9.8}});
+  buffer.Add({.time_ns = 10, .gyro = {2, 0, -1}, .accel = {0, 0, 9.8}});
+  EXPECT_EQ(buffer.GyroAt(0), Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(buffer.GyroAt(5), Eigen::Vector3d(1.5, 0, -0.5));
+  EXPECT_EQ(buffer.GyroAt(10), Eigen::Vector3d(2, 0, -1));
+  EXPECT_FALSE(buffer.GyroAt(11));
+  EXPECT_FALSE(buffer.GyroAt(-1));
+}
+
 TEST(ImuBuffer, RefusesAndCountsDuplicatesBackwardTimesAndNumbersThatAreNone) {
   ImuBuffer buffer({});
   EXPECT_TRUE(buffer.Add(At(5)));

@@ -14,8 +14,8 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr BlockId kPose0{0, false}, kMotion0{0, true}, kPose1{1, false}, kMotion1{1, true},
-    kPose2{2, false};
+constexpr BlockId kPose0{0, Part::kPose}, kMotion0{0, Part::kMotion}, kPose1{1, Part::kPose},
+    kMotion1{1, Part::kMotion}, kPose2{2, Part::kPose};
 
 MatrixXd RandomMatrix(Index rows, Index columns, std::uint64_t seed) {
   MatrixXd m(rows, columns);
@@ -99,7 +99,7 @@ struct Chain {
     MatrixXd S = RandomMatrix(rows, size, seed);
     Index column = 0;
     for (const BlockId block : blocks) {
-      if (block.motion) S.middleCols(column + 3, 3) *= 1e3;
+      if (block.part == Part::kMotion) S.middleCols(column + 3, 3) *= 1e3;
       column += block.size();
     }
     const VectorXd e = RandomMatrix(rows, 1, seed + 100);
@@ -123,9 +123,9 @@ TEST(SquareRootPrior, AddsRowsToTheirBlocks) {
   EXPECT_EQ(chain.prior.OffsetOf(kMotion0), 6);
   EXPECT_EQ(chain.prior.OffsetOf(kPose2), 30);
   EXPECT_TRUE(chain.prior.Has(kMotion1));
-  EXPECT_FALSE(chain.prior.Has({2, true}));
+  EXPECT_FALSE(chain.prior.Has({2, Part::kMotion}));
   EXPECT_THAT(ErrorMessage([&] {
-                chain.prior.OffsetOf({7, false});
+                chain.prior.OffsetOf({7, Part::kPose});
               }),
               testing::HasSubstr("has no frame 7"));
 }
@@ -152,7 +152,7 @@ TEST(SquareRootPrior, AddsToWhatMarginalizationLeft) {
 TEST(SquareRootPrior, IgnoresBlocksThatItDoesNotHave) {
   Chain chain(3);
   const MatrixXd H = chain.prior.S().transpose() * chain.prior.S();
-  chain.prior.Marginalize(std::vector<BlockId>{{9, false}, {2, true}});
+  chain.prior.Marginalize(std::vector<BlockId>{{9, Part::kPose}, {2, Part::kMotion}});
   ExpectSame(chain.prior, chain.normal);
   EXPECT_LT((chain.prior.S().transpose() * chain.prior.S() - H).norm(), 1e-12 * H.norm());
   SquareRootPrior empty;
@@ -198,11 +198,11 @@ TEST(SquareRootPrior, KeepsUnobservableDirectionsThroughManyMarginalizations) {
     const MatrixXd A = RandomMatrix(6, 6, k);
     MatrixXd S(6, 12);
     S << A, -A;
-    prior.Add(std::vector<BlockId>{{k, false}, {k + 1, false}}, S, VectorXd::Zero(6));
+    prior.Add(std::vector<BlockId>{{k, Part::kPose}, {k + 1, Part::kPose}}, S, VectorXd::Zero(6));
     MatrixXd far(6, 12);
     far << 1e-2 * A, -1e-2 * A;
-    prior.Add(std::vector<BlockId>{{k, false}, {k + 2, false}}, far, VectorXd::Zero(6));
-    prior.Marginalize(std::vector<BlockId>{{k, false}});
+    prior.Add(std::vector<BlockId>{{k, Part::kPose}, {k + 2, Part::kPose}}, far, VectorXd::Zero(6));
+    prior.Marginalize(std::vector<BlockId>{{k, Part::kPose}});
     ASSERT_EQ(prior.blocks().size(), 2u);
     MatrixXd together(12, 6);
     together << MatrixXd::Identity(6, 6), MatrixXd::Identity(6, 6);

@@ -373,6 +373,39 @@ TEST(StereoInertialOdometry, LeavesOutASensorWithAnotherClock) {
   }
 }
 
+TEST(StereoInertialOdometry, FindsWhatTheCamerasClockIsOffBy) {
+  constexpr double kLate_s = 0.008;
+  const auto fly = [](double sd_s) {
+    VioOptions options = Options();
+    options.calibration.time_offset_sd_s = sd_s;
+    Ridden flight(options);
+    for (int k = 0; k < 100; ++k) {
+      flight.Feed(k, [&](ImuSample& sample) {
+        sample.time_ns += static_cast<std::int64_t>(1e9 * kLate_s);
+        return true;
+      });
+      flight.Look(k);
+    }
+    return flight;
+  };
+  const Ridden held = fly(0), free = fly(0.01);
+  EXPECT_TRUE(held.results.back().calibration.IsIdentity());
+  EXPECT_EQ(held.results.back().calibration_covariance.norm(), 0);
+  const VioFrameResult& last = free.results.back();
+  EXPECT_TRUE(last.inertial);
+  EXPECT_NEAR(last.calibration.time_offset_s, kLate_s, 1e-3);
+  EXPECT_LT(Minus(last.calibration, {}).head<6>().norm(), 1e-6);
+  EXPECT_GT(last.calibration_covariance(6, 6), 0);
+  EXPECT_LT(std::sqrt(last.calibration_covariance(6, 6)), 4e-3);
+  EXPECT_LT(MotionError(free, kSettled, 99), 0.04);
+  double with = 0, without = 0;  // the sensor's errors since it has taken part for a while
+  for (size_t k = 60; k < 100; ++k) {
+    with += free.results[k].window.inertial_error;
+    without += held.results[k].window.inertial_error;
+  }
+  EXPECT_LT(with, 0.8 * without);
+}
+
 TEST(StereoInertialOdometry, LeavesOutSamplesThatAreNone) {
   Ridden flight;
   int spoilt = 0;
@@ -559,6 +592,12 @@ TEST(StereoInertialOdometry, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refusal([](auto& o) { o.blind_s = -1; }), HasSubstr("blind_s"));
   EXPECT_THAT(refusal([](auto& o) { o.start_s = 0; }), HasSubstr("start_s"));
   EXPECT_THAT(refusal([](auto& o) { o.max_inertial_error = 0; }), HasSubstr("max_inertial_error"));
+  EXPECT_THAT(refusal([](auto& o) { o.calibration.time_offset_sd_s = 0.06; }),
+              HasSubstr("calibration.time_offset_sd_s"));
+  EXPECT_THAT(refusal([](auto& o) { o.calibration.rotation_sd_rad = -0.01; }),
+              HasSubstr("calibration.rotation_sd_rad"));
+  EXPECT_THAT(refusal([](auto& o) { o.calibration.position_sd_m = NAN; }),
+              HasSubstr("calibration.position_sd_m"));
   EXPECT_THAT(refusal([](auto& o) { o.threads = -1; }), HasSubstr("threads"));
   EXPECT_THAT(refusal([](auto& o) { o.window.sigma_px = 0; }), HasSubstr("window.sigma_px"));
   EXPECT_THAT(refusal([](auto& o) { o.flow.levels = 0; }), HasSubstr("flow.levels"));

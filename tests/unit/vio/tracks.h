@@ -92,6 +92,8 @@ class SimulatedWindow {
     int threads = 1;
     /// A landmark that comes again brings its older sights, though the prior may know them.
     bool reuse_sights = false;
+    /// Images are taken so many inertial samples after their time stamps.
+    int late_samples = 0;
   };
 
   SimulatedWindow(const Flight& flight, Sightings sightings, const Options& options)
@@ -104,6 +106,10 @@ class SimulatedWindow {
 
   static size_t SampleOf(int frame) { return static_cast<size_t>(frame) * kImuPerFrame; }
   const BodyState& TruthOf(int frame) const { return flight_.truth[SampleOf(frame)]; }
+
+  const SE3& PoseSeenOf(int frame) const {
+    return flight_.truth[SampleOf(frame) + options_.late_samples].T_world_body;
+  }
 
   /// The next frame, where the inertial sensor takes the last one.
   void Push(const std::optional<BodyState>& start = std::nullopt) {
@@ -118,9 +124,10 @@ class SimulatedWindow {
                                            {last.state.gyro_bias, last.state.accel_bias});
       frame.state = frame.since_last->Predict(last.state, kGravity);
     }
+    frame.angular_velocity = flight_.samples[SampleOf(frame.id)].gyro - frame.state.gyro_bias;
     frame.keyframe = frame.id % options_.keyframe_gap == 0;
     window.frames.push_back(frame);
-    const SE3& truth = TruthOf(frame.id).T_world_body;
+    const SE3& truth = PoseSeenOf(frame.id);
     for (auto& [k, landmark] : window.landmarks)
       sightings_.Show(static_cast<int>(k), frame.id, truth, landmark);
     if (frame.keyframe) MakeLandmarks(frame.id, truth);
@@ -154,8 +161,7 @@ class SimulatedWindow {
       if (!landmark) continue;
       if (options_.reuse_sights)
         for (const Frame& other : window.frames)
-          if (other.id != frame)
-            sightings_.Show(k, other.id, TruthOf(other.id).T_world_body, *landmark);
+          if (other.id != frame) sightings_.Show(k, other.id, PoseSeenOf(other.id), *landmark);
       window.landmarks.emplace(k, *landmark);
     }
   }

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -331,7 +332,7 @@ MatrixXd GaugeOf(const Window& window) {
   for (const BlockId block : window.prior().blocks()) {
     const int row = window.prior().OffsetOf(block);
     const BodyState& at = window.Find(block.frame)->linearization;
-    if (block.motion) {
+    if (block.part == Part::kMotion) {
       gauge.block<3, 3>(row, 0) = -HatSO3(at.velocity);
       continue;
     }
@@ -340,6 +341,94 @@ MatrixXd GaugeOf(const Window& window) {
     gauge.block<3, 3>(row + 3, 3).setIdentity();
   }
   return gauge;
+}
+
+/// A window that slides over images of a rig and a clock that are off.
+struct Miscalibrated {
+  static constexpr double kOffset_s = 0.005;  // one inertial sample
+  const SE3 off{ExpSO3({0.012, -0.008, 0.01}), {0.02, -0.015, 0.01}};
+  SimulatedWindow simulated;
+
+  explicit Miscalibrated(double sigma_px, std::uint64_t seed = 7)
+      : simulated(TestFlight(true), Sightings(TrueRig(), WallPoints(kPoints, 1), sigma_px, seed),
+                  {.late_samples = 1}) {}
+
+  VioRig TrueRig() const {
+    VioRig rig = TestRig();
+    for (SE3& T : rig.T_body_cam) T = off * T;
+    return rig;
+  }
+
+  /// @param sigmas of the calibration; nothing to leave it as it is.
+  void Fly(int frames, const std::optional<CalibrationVector>& sigmas) {
+    for (int k = 0; k < frames; ++k) {
+      simulated.Push();
+      if (k == 0) Anchor(simulated.window.frames[0], AnchorSigmas(), simulated.window);
+      if (k == 0 && sigmas) simulated.window.AnchorCalibration(*sigmas);
+      simulated.window.Refine();
+      if (k + 1 < frames) simulated.Marginalize(3, 5);
+    }
+  }
+
+  CalibrationVector Error() const {
+    return Minus(simulated.window.calibration(), {off, kOffset_s});
+  }
+};
+
+CalibrationVector Unsure() {
+  CalibrationVector sigmas;
+  sigmas << Vector3d::Constant(0.02), Vector3d::Constant(0.03), 0.01;
+  return sigmas;
+}
+
+TEST(Window, FindsTheCalibration) {
+  Miscalibrated flight(0.3);
+  flight.Fly(35, Unsure());
+  const CalibrationVector error = flight.Error();
+  EXPECT_LT(error.head<3>().norm(), 2e-3);
+  EXPECT_LT(error.segment<3>(3).norm(), 0.02);  // the least observable part
+  EXPECT_LT(std::abs(error(6)), 5e-4);
+  EXPECT_TRUE(flight.simulated.window.calibrates());
+  // It is known as well as the covariance says, and better than at first.
+  const CalibrationMatrix covariance =
+      flight.simulated.window.CovarianceOf(flight.simulated.window.frames.back()).calibration;
+  EXPECT_LT(error.dot(covariance.ldlt().solve(error)), 24);  // 99.9 % of chi-square with 7 degrees
+  for (int k = 0; k < kCalibrationParameters; ++k)
+    EXPECT_LT(std::sqrt(covariance(k, k)), 0.5 * Unsure()(k)) << k;
+}
+
+TEST(Window, WithTheCalibrationFollowsWhatItWouldNotWithout) {
+  Miscalibrated without(0.3), with(0.3);
+  without.Fly(35, std::nullopt);
+  with.Fly(35, Unsure());
+  EXPECT_TRUE(without.simulated.window.calibration().IsIdentity());
+  EXPECT_FALSE(without.simulated.window.calibrates());
+  EXPECT_LT(ErrorsOf(with.simulated).rotation, 0.5 * ErrorsOf(without.simulated).rotation);
+  EXPECT_LT(ErrorsOf(with.simulated).velocity, 0.5 * ErrorsOf(without.simulated).velocity);
+}
+
+TEST(Window, HoldsWhatOfTheCalibrationIsCertain) {
+  Miscalibrated flight(0.3);
+  CalibrationVector sigmas = CalibrationVector::Zero();
+  sigmas(6) = 0.01;
+  flight.Fly(15, sigmas);
+  const Calibration& found = flight.simulated.window.calibration();
+  EXPECT_LT(Minus(found, {}).head<6>().norm(), 1e-6);
+  EXPECT_GT(found.time_offset_s, 1e-3);
+}
+
+// It is kept, and taken as it is, when all else that is known is dropped.
+TEST(Window, KeepsTheCalibrationWithoutThePrior) {
+  Miscalibrated flight(0.3);
+  flight.Fly(20, Unsure());
+  Window& window = flight.simulated.window;
+  const Calibration before = window.calibration();
+  window.DropPrior();
+  EXPECT_FALSE(window.calibrates());
+  Anchor(window.frames.front(), AnchorSigmas(), window);
+  EXPECT_TRUE(window.Refine().usable);
+  EXPECT_EQ(Minus(window.calibration(), before).norm(), 0);
+  EXPECT_LT(ErrorsOf(flight.simulated).position, 0.1);
 }
 
 TEST(Window, PriorLeavesPositionAndYawAlone) {
