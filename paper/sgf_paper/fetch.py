@@ -106,12 +106,12 @@ def check(name: str, archive: Archive, file: Path, records: Records) -> str:
 
 @dataclass
 class Fetcher:
-    """Fetches data sets into a folder that it has to itself."""
+    """Fetches data sets into a folder, which has to be taken first (see take())."""
 
     catalog: Catalog
     into: Path
     patience: Patience
-    lock: int  # the open file that holds the folder
+    lock: int = -1  # the open file that holds the folder, once it is taken
     checked: dict[str, str] = field(default_factory=dict)  # SHA-256 of archives that are right, by name
     failed: dict[str, str] = field(default_factory=dict)  # why archives cannot be had, by name
 
@@ -353,7 +353,8 @@ def require_space(fetcher: Fetcher, names: list[str]) -> None:
 
 
 def run(catalog: Catalog, names: list[str], into: Path, accepted: bool, patience: Patience) -> int:
-    fetcher = Fetcher(catalog, into, patience, take(into))
+    """Shows licences, looks for space and fetches data sets; the exit code. Writes nothing that was not accepted."""
+    fetcher = Fetcher(catalog, into, patience)
     absent = [name for name in names if not fetcher.is_there(name)]
     wanted = [name for name in absent if not fetcher.is_by_hand(name)]
     if wanted:
@@ -361,6 +362,7 @@ def run(catalog: Catalog, names: list[str], into: Path, accepted: bool, patience
         say("\n".join(licence_lines(catalog, wanted)))
     if wanted and accepted:
         say("== fetching")
+        fetcher.lock = take(into)
         require_space(fetcher, wanted)
     return fetch(fetcher, names, accepted)
 

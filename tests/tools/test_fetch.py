@@ -265,7 +265,7 @@ def test_what_is_downloaded_for_experiments(tmp_path):
 
 def test_without_accepted_licences_they_are_shown_and_nothing_is_downloaded(world):
     code, output = world.fetch(accept=False)
-    assert code == 1 and world.is_absent() and world.server.requests == []
+    assert code == 1 and not world.into.exists() and world.server.requests == []
     for text in ("licence: CC0", "home: https://example.org", "cite: We, 2020"):
         assert text in output
     assert "NOT FETCHED" in last_line(output) and "--accept-licences" in last_line(output)
