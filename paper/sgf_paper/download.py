@@ -7,6 +7,7 @@ all is there.
 
 from __future__ import annotations
 
+import glob
 import os
 import re
 import subprocess
@@ -62,9 +63,8 @@ def _control(part: Path) -> Path:
 
 def drop(part: Path) -> None:
     """Forgets what has arrived."""
-    part.unlink(missing_ok=True)
-    for end in ("aria2", "log"):
-        part.with_name(f"{part.name}.{end}").unlink(missing_ok=True)
+    for file in part.parent.glob(f"{glob.escape(part.name)}*"):
+        file.unlink()
 
 
 def arrived(part: Path) -> int:

@@ -412,12 +412,15 @@ def test_a_server_that_ignores_ranges(world):
     assert code == 0 and world.is_right(), output
 
 
-def leave_partial_file(world):
+def leave_partial_file(world, kill=os.kill):
     """Has a download killed when some of it has arrived."""
     world.server.manners["toy.zip"] = "slow"
     part = world.into / ".sgf-fetch" / "toy.zip.part"
     process = subprocess.Popen(
-        world.command("toy", "--accept-licences"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        world.command("toy", "--accept-licences"),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
     deadline = time.time() + 60
     while not part.with_name("toy.zip.part.aria2").exists() or part.stat().st_blocks < 1000:
@@ -425,15 +428,16 @@ def leave_partial_file(world):
         time.sleep(0.02)
     time.sleep(1.2)  # aria2 notes every second what it has
     assert process.poll() is None, "the server is too fast for this test"
-    process.send_signal(signal.SIGKILL)
+    kill(process.pid, signal.SIGKILL)
     process.wait()
     assert world.is_absent()
     return part
 
 
-def test_a_download_goes_on_after_a_kill(world):
+@pytest.mark.parametrize("kill", [os.kill, os.killpg], ids=["of fetch", "of aria2 too"])
+def test_a_download_goes_on_after_a_kill(world, kill):
     world.archive["sha256"] = hashlib.sha256(world.toy).hexdigest()
-    leave_partial_file(world)
+    leave_partial_file(world, kill)
     world.server.manners.clear()
     time.sleep(2)  # aria2 notices that nobody waits for it
     world.server.requests.clear()
