@@ -32,7 +32,7 @@ ENV HOME=/tmp USER=sgf
 RUN cmake --preset release \
  && cmake --build --preset release \
  && rm build/release/provenance.cc build/release/sgf-config*.cmake \
- && mkdir -p results datasets/generated \
+ && mkdir -p results datasets/generated datasets/downloaded \
  && chmod -R a+rwX .
 
 ENTRYPOINT ["./reproduce.sh"]

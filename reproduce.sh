@@ -24,8 +24,11 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --data DIR      folder with downloaded data sets; default: environment variable SGF_DATA, or none.
                   Without it the pairs that Debian packages ship are used.
   --sanitize      test: only the C++ unit tests, under the address and undefined-behaviour sanitizers
-  --full          render the full suite of eleven sequences (15 GB at most) instead of the short one
-                  of four (2 GB at most)
+  --full          the paper's own data sets at the paper's own sizes: fetch those that the experiments
+                  use (26 GB of archives for all) into --data, or datasets/downloaded without it, and
+                  render the full suite of eleven sequences (15 GB at most) instead of four (2 GB at most)
+  --accept-licences  --full: you accept the licences of the data sets, which it shows; without this
+                  nothing is downloaded and the run goes on with what is at hand
   --runs N        runs of each line of the tables that repeat runs (odometry, table3);
                   default: a few, for a quick look; rankings take 10, shares of success 25
   --jobs N        parallel jobs; default: the number of processors
@@ -195,10 +198,19 @@ clean() {
   echo "Removed build/release, build/sanitize, datasets/generated and all of results but reference and external."
 }
 
+# What cannot be fetched is said; the run goes on with what is at hand.
+fetch_datasets() {
+  echo "== data sets to download"
+  "$python" datasets/fetch --for "${stages[@]}" --into "$data" "${accepted[@]}" 2>&1 |
+    tee "$logs/fetch.log" ||
+    printf '  going on with the data sets at hand; log: %s\n' "$logs/fetch.log"
+}
+
 run_experiments() {
   local -a mrpt
   echo "== packages [run] [report]"
   install_packages run report
+  ((${#full[@]} == 0)) || fetch_datasets
   echo "== build"
   configure release "$(tests_in_build)"
   mapfile -t mrpt < <(mrpt_programs)
@@ -232,6 +244,7 @@ mode=run
 stages=()
 preset=release
 full=()
+accepted=()
 runs=()
 data=${SGF_DATA:-}
 jobs=$(nproc)
@@ -254,6 +267,7 @@ while (($#)); do
       ;;
     --sanitize) preset=sanitize ;;
     --full) full=(--full) ;;
+    --accept-licences) accepted=(--accept-licences) ;;
     --runs)
       require_number "$@"
       runs=(--runs "$2")
@@ -279,6 +293,13 @@ if [[ $mode == test && ${#stages[@]} -gt 0 ]]; then
 fi
 if [[ $preset == sanitize && $mode != test ]]; then
   wrong_usage "--sanitize goes with test only"
+fi
+if [[ ${#accepted[@]} -gt 0 && (${#full[@]} -eq 0 || $mode != run) ]]; then
+  wrong_usage "--accept-licences goes with --full only"
+fi
+if [[ $mode == run && ${#full[@]} -gt 0 && -z $data ]]; then
+  data=$project/datasets/downloaded
+  mkdir -p "$data"
 fi
 if [[ -n $data ]]; then
   cd -- "$caller"

@@ -21,7 +21,7 @@ EXPERIMENTS = PAPER / "experiments"
 SWEEPS = PAPER / "sweeps"
 PUBLISHED = PAPER / "published.yaml"
 RECIPES = PROJECT / "datasets" / "synthetic"
-CATALOGUE = PROJECT / "datasets" / "catalogue.yaml"
+STEREO_LAYOUTS = PROJECT / "datasets" / "stereo_layouts.yaml"
 FIRST_FRAME_STEP = 7  # between runs of odometry
 TUNING_SEED = 1000  # that of a table's run and this make that of a run which options are tuned on
 
@@ -1129,7 +1129,7 @@ def image_times_ns(sequence: Path) -> list[int]:
 
 def dataset_flags(data: str, generated: str) -> list[str]:
     """Flags that tell sgf_eval where data sets are; `data` may be empty."""
-    flags = ["--catalogue", str(CATALOGUE), "--generated", generated]
+    flags = ["--layouts", str(STEREO_LAYOUTS), "--generated", generated]
     return [*flags, "--data", data] if data else flags
 
 

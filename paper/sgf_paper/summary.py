@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from sgf_paper import bench, config, text, trajectory_table
+from sgf_paper import bench, catalog, config, text, trajectory_table
+from sgf_paper.catalog import Source
 from sgf_paper.config import Dataset, Experiment
 
 FILES = {
@@ -264,12 +265,17 @@ def stage_lines(stage: Experiment, results: Path, started: float) -> list[str]:
     return [head, *(f"    {line}" for line in _measured(stage, results))]
 
 
+def _where_to_get(name: str, source: Source) -> str:
+    """A data set's home, and how to have it fetched or what to do."""
+    return f"{source.publisher.home}; {source.by_hand or f'datasets/fetch {name} --into DIR'}"
+
+
 def absent_datasets(stages: list[Experiment], datasets: dict[str, Dataset]) -> list[str]:
-    """Data sets that the stages would use and that were not found, each with its source."""
+    """Data sets that the stages would use and that were not found, each with where to get it."""
     wanted = []
     for stage in stages:
         if stage.kind == "table":
             wanted += stage.datasets
-    catalogue = config.read_yaml(config.CATALOGUE)
+    known = catalog.load_catalog().datasets
     missing = [name for name in dict.fromkeys(wanted) if name not in datasets]
-    return [f"{name} ({', '.join(catalogue[name]['source'])})" for name in missing]
+    return [f"{name} ({_where_to_get(name, known[name])})" for name in missing]

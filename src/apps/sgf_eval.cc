@@ -5,8 +5,8 @@
 #include <sgf/apps/cli.h>
 #include <sgf/apps/stereo_sweep.h>
 #include <sgf/apps/trajectory_scores.h>
-#include <sgf/io/catalogue.h>
 #include <sgf/io/stereo_dataset.h>
+#include <sgf/io/stereo_layouts.h>
 
 namespace sgf::apps {
 namespace {
@@ -14,38 +14,38 @@ namespace {
 namespace fs = std::filesystem;
 
 struct DataArguments {
-  std::string catalogue = "datasets/catalogue.yaml";
+  std::string layouts = "datasets/stereo_layouts.yaml";
   std::string data;
   std::string generated = "datasets/generated";
 };
 
 void AddDataArguments(CLI::App& app, DataArguments& data) {
-  app.add_option("--catalogue", data.catalogue, "list of known datasets")->capture_default_str();
+  app.add_option("--layouts", data.layouts, "list of known stereo datasets")->capture_default_str();
   app.add_option("--data", data.data, "folder with downloaded datasets")->envname("SGF_DATA");
   app.add_option("--generated", data.generated, "folder with datasets made from packages")
       ->capture_default_str();
 }
 
-std::optional<fs::path> Find(const CatalogueEntry& entry, const DataArguments& data) {
+std::optional<fs::path> Find(const StereoDatasetEntry& entry, const DataArguments& data) {
   const std::string& root = entry.generated ? data.generated : data.data;
   return root.empty() ? std::nullopt : FindDataset(entry, root);
 }
 
 void ListDatasets(const DataArguments& data) {
-  for (const CatalogueEntry& entry : ReadCatalogue(data.catalogue))
+  for (const StereoDatasetEntry& entry : ReadStereoLayouts(data.layouts))
     if (const auto folder = Find(entry, data))
       fmt::print("{}\t{}\t{}\n", entry.name, folder->string(),
                  ListStereoScenes(*folder, entry.layout).size());
 }
 
 void SweepDataset(const DataArguments& data, const StereoSweepRequest& request) {
-  for (const CatalogueEntry& entry : ReadCatalogue(data.catalogue)) {
+  for (const StereoDatasetEntry& entry : ReadStereoLayouts(data.layouts)) {
     if (entry.name != request.dataset) continue;
     const auto folder = Find(entry, data);
     if (!folder) throw Error(request.dataset, "is not in the data folders");
     return RunStereoSweep(request, entry, *folder);
   }
-  throw Error(data.catalogue, fmt::format("has no dataset '{}'", request.dataset));
+  throw Error(data.layouts, fmt::format("has no dataset '{}'", request.dataset));
 }
 
 // The subcommand `trajectory`: its arguments, and what runs it.
@@ -108,7 +108,7 @@ int main(int argc, char** argv) {
       app.add_subcommand("stereo", "score one column of a stereo sweep on all scenes of a dataset");
   apps::AddDataArguments(*stereo, data);
   stereo->add_option("--experiment", request.experiment, "YAML file of the sweep")->required();
-  stereo->add_option("--dataset", request.dataset, "name in the catalogue")->required();
+  stereo->add_option("--dataset", request.dataset, "name in the list of --layouts")->required();
   stereo->add_option("--column", request.column, "name in the sweep")->required();
   stereo->add_option("--out", request.output, "CSV file to write")->required();
   stereo->add_option("--options-out", request.options_output, "YAML file for every parameter");

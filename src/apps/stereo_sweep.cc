@@ -161,7 +161,7 @@ void SetPairOptions(StereoOptions& options, int num_disparities, int window) {
   std::visit(set, options);
 }
 
-void RunSweep(const StereoSweepRequest& request, const CatalogueEntry& entry,
+void RunSweep(const StereoSweepRequest& request, const StereoDatasetEntry& entry,
               const std::filesystem::path& folder) {
   const Sweep sweep = ReadSweep(request.experiment);
   Column column = ReadColumn(sweep, request);
@@ -198,7 +198,7 @@ void RunSweep(const StereoSweepRequest& request, const CatalogueEntry& entry,
 
 }  // namespace
 
-void RunStereoSweep(const StereoSweepRequest& request, const CatalogueEntry& entry,
+void RunStereoSweep(const StereoSweepRequest& request, const StereoDatasetEntry& entry,
                     const std::filesystem::path& folder) {
   try {
     RunSweep(request, entry, folder);

@@ -35,7 +35,7 @@ enum class StereoLayout {
   kKitti2012,
 };
 
-/// Names of the layouts in catalogue files.
+/// Names of the layouts in files as datasets/stereo_layouts.yaml.
 std::span<const std::pair<const char*, StereoLayout>> EnumNames(StereoLayout);
 
 /// Files of one stereo pair.

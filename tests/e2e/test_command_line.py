@@ -61,6 +61,8 @@ def test_help_and_list_need_nothing_built(project):
         (["--data", "/nonexistent/data"], "data folder '/nonexistent/data' does not exist"),
         (["test", "--only", "table1"], "does not go with test"),
         (["--sanitize"], "--sanitize goes with test only"),
+        (["--accept-licences"], "--accept-licences goes with --full only"),
+        (["test", "--full", "--accept-licences"], "--accept-licences goes with --full only"),
     ],
 )
 def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, message):
@@ -74,6 +76,42 @@ def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, mes
 def test_full_goes_with_everything(project, command):
     code, output = project.run("--full", *command)
     assert code == 0, output
+
+
+FETCH = """#!/usr/bin/python3
+import pathlib, sys
+pathlib.Path(__file__).with_name("fetched").write_text(" ".join(sys.argv[1:]))
+sys.exit("Error: no network")
+"""
+
+
+def test_full_without_accepted_licences_says_so_and_goes_on(project):
+    code, output = project.run("--full", "--only", "fig1")
+    assert code == 0, output
+    assert "icl_nuim_lr_kt2        NOT FETCHED: accept its licence, above, with --accept-licences" in output
+    assert "licence: CC BY 3.0" in output and "middlebury" not in output[: output.index("== build")]
+    assert f"going on with the data sets at hand; log: {project.results}/logs/fetch.log" in output
+    assert "fig1           made" in output
+    assert list((project.root / "datasets" / "downloaded").iterdir()) == []
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_full_fetches_what_the_experiments_use_and_goes_on_without_a_network(project, own):
+    (project.root / "datasets" / "fetch").write_text(FETCH)
+    project.data.mkdir()
+    data = project.data if own else project.root / "datasets" / "downloaded"
+    flags = ["--data", project.data] if own else []
+    code, output = project.run("--full", "--accept-licences", "--only", "scenes", "table1", *flags)
+    assert code == 0 and "Error: no network" in output and "scenes         made" in output, output
+    called = (project.root / "datasets" / "fetched").read_text()
+    assert called == f"--for scenes table1 --into {data} --accept-licences"
+
+
+def test_a_run_that_is_not_full_and_tests_fetch_nothing(project):
+    (project.root / "datasets" / "fetch").write_text(FETCH)
+    assert project.run("--only", "scenes")[0] == 0
+    assert project.run("test", "--full")[0] == 0
+    assert not (project.root / "datasets" / "fetched").exists()
 
 
 def test_a_data_folder_from_the_environment_must_exist(project):

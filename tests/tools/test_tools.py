@@ -319,7 +319,7 @@ def test_a_wrong_command_line_ends_with_2(pair):
 @pytest.fixture
 def sweep(scene, tmp_path):
     """Arguments of `sgf_eval stereo` for a sweep over the one scene."""
-    (tmp_path / "catalogue.yaml").write_text(
+    (tmp_path / "layouts.yaml").write_text(
         "walls: {title: Walls, layout: middlebury_eval3, folders: [dataset]}\n"
     )
     (tmp_path / "sweep.yaml").write_text(
@@ -330,7 +330,7 @@ def sweep(scene, tmp_path):
         "options: {left_right_max: 2}\ngrid: {windows: [5, 9], uniqueness: [0, 15]}\n"
     )
     return [
-        "stereo", "--experiment", tmp_path / "sweep.yaml", "--catalogue", tmp_path / "catalogue.yaml",
+        "stereo", "--experiment", tmp_path / "sweep.yaml", "--layouts", tmp_path / "layouts.yaml",
         "--data", tmp_path, "--dataset", "walls", "--out", tmp_path / "raw.csv",
     ]
 

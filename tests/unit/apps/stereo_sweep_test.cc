@@ -68,7 +68,7 @@ class StereoSweepTest : public ::testing::Test {
 
   // The lines of the CSV file as maps from its header's names.
   std::vector<std::map<std::string, std::string>> Run(const StereoSweepRequest& request) const {
-    CatalogueEntry entry;
+    StereoDatasetEntry entry;
     entry.name = request.dataset;
     RunStereoSweep(request, entry, dir_.path() / "data");
     std::istringstream csv(ReadFile(request.output));

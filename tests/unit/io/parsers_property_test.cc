@@ -7,10 +7,10 @@
 
 #include <sgf/core/error.h>
 #include <sgf/io/calib.h>
-#include <sgf/io/catalogue.h>
 #include <sgf/io/disparity.h>
 #include <sgf/io/image.h>
 #include <sgf/io/pfm.h>
+#include <sgf/io/stereo_layouts.h>
 #include <sgf/io/trajectory.h>
 
 #include "encoded_images.h"
@@ -102,7 +102,7 @@ const Bytes kPng8 = Encode(".png", RandomImage(5, 7, CV_8UC3));
 const Bytes kPng16 = Encode(".png", RandomImage(5, 7, CV_16UC1));
 const Bytes kJpeg = Encode(".jpg", RandomImage(9, 10, CV_8UC3));
 const Bytes kPpm = Encode(".ppm", RandomImage(3, 4, CV_8UC3));
-const Bytes kCatalogue =
+const Bytes kLayouts =
     "a:\n  title: 'A'\n  layout: kitti2015\n  folders: &x [a/b, \"c\"]\n  scenes: 3\n"
     "b: {title: B, layout: kitti2012, folders: *x}\n";
 const Bytes kTrajectory = "# t x y z\n1.5 0 0 0 0 0 0 1\n2.5e+00 1 2 3 0.5 0.5 0.5 0.5\n";
@@ -111,7 +111,7 @@ TEST(ParserProperty, MutationsStartFromValidFiles) {
   EXPECT_TRUE(Parses(kPfm, ReadPfm));
   EXPECT_TRUE(Parses(kCalib, ReadCalibNdisp));
   EXPECT_TRUE(Parses(kCalib, ReadMiddleburyCalib));
-  EXPECT_TRUE(Parses(kCatalogue, ReadCatalogue));
+  EXPECT_TRUE(Parses(kLayouts, ReadStereoLayouts));
   EXPECT_TRUE(Parses(kTrajectory, ReadTrajectory));
   EXPECT_TRUE(Parses(kPng8, ReadAnyImage));
   EXPECT_TRUE(Parses(kPng16, ReadAnyImage));
@@ -133,12 +133,13 @@ RC_GTEST_PROP(ParserProperty, CalibFromMutatedFiles, ()) {
   ParsesOrFails(Mutated(kCalib), ReadMiddleburyCalib);
 }
 
-RC_GTEST_PROP(ParserProperty, CatalogueFromRandomBytes, ()) {
-  ParsesOrFails(RandomBytesAfter({"", "a: ", "a: {", "a:\n  folders: [", "- &a"}), ReadCatalogue);
+RC_GTEST_PROP(ParserProperty, StereoLayoutsFromRandomBytes, ()) {
+  ParsesOrFails(RandomBytesAfter({"", "a: ", "a: {", "a:\n  folders: [", "- &a"}),
+                ReadStereoLayouts);
 }
 
-RC_GTEST_PROP(ParserProperty, CatalogueFromMutatedFiles, ()) {
-  ParsesOrFails(Mutated(kCatalogue), ReadCatalogue);
+RC_GTEST_PROP(ParserProperty, StereoLayoutsFromMutatedFiles, ()) {
+  ParsesOrFails(Mutated(kLayouts), ReadStereoLayouts);
 }
 
 RC_GTEST_PROP(ParserProperty, TrajectoryFromMutatedFiles, ()) {

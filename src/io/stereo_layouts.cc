@@ -3,8 +3,8 @@
 
 #include <sgf/core/error.h>
 #include <sgf/core/options.h>
-#include <sgf/io/catalogue.h>
 #include <sgf/io/read_file.h>
+#include <sgf/io/stereo_layouts.h>
 
 namespace sgf {
 namespace {
@@ -19,16 +19,16 @@ void RequireKeys(const YAML::Node& map, const std::string& name, const std::stri
       throw Error(where, fmt::format("dataset {} has no {}", name, key));
 }
 
-void RequireRelativeFolders(const CatalogueEntry& entry, const std::string& where) {
+void RequireRelativeFolders(const StereoDatasetEntry& entry, const std::string& where) {
   if (entry.folders.empty()) throw Error(where, "expected at least one folder");
   for (const std::string& folder : entry.folders)
     if (folder.empty() || std::filesystem::path(folder).is_absolute())
       throw Error(where, fmt::format("folder '{}' is not relative to a data root", folder));
 }
 
-CatalogueEntry ReadEntry(const YAML::Node& key, const YAML::Node& value,
-                         const std::filesystem::path& path) {
-  CatalogueEntry entry;
+StereoDatasetEntry ReadEntry(const YAML::Node& key, const YAML::Node& value,
+                             const std::filesystem::path& path) {
+  StereoDatasetEntry entry;
   entry.name = key.as<std::string>();
   ReadOptions(value, entry, path.string());
   RequireKeys(value, entry.name, At(path, key.Mark()));
@@ -36,12 +36,13 @@ CatalogueEntry ReadEntry(const YAML::Node& key, const YAML::Node& value,
   return entry;
 }
 
-std::vector<CatalogueEntry> ReadEntries(const YAML::Node& root, const std::filesystem::path& path) {
+std::vector<StereoDatasetEntry> ReadEntries(const YAML::Node& root,
+                                            const std::filesystem::path& path) {
   if (!root.IsMap()) throw Error(At(path, root.Mark()), "expected a map of datasets");
-  std::vector<CatalogueEntry> entries;
+  std::vector<StereoDatasetEntry> entries;
   for (const auto& item : root) {
-    CatalogueEntry entry = ReadEntry(item.first, item.second, path);
-    for (const CatalogueEntry& other : entries)
+    StereoDatasetEntry entry = ReadEntry(item.first, item.second, path);
+    for (const StereoDatasetEntry& other : entries)
       if (other.name == entry.name)
         throw Error(At(path, item.first.Mark()),
                     fmt::format("dataset {} is there twice", entry.name));
@@ -52,7 +53,7 @@ std::vector<CatalogueEntry> ReadEntries(const YAML::Node& root, const std::files
 
 }  // namespace
 
-std::vector<CatalogueEntry> ReadCatalogue(const std::filesystem::path& path) {
+std::vector<StereoDatasetEntry> ReadStereoLayouts(const std::filesystem::path& path) {
   const std::string text = ReadFile(path);
   try {
     return ReadEntries(YAML::Load(text), path);
@@ -61,7 +62,7 @@ std::vector<CatalogueEntry> ReadCatalogue(const std::filesystem::path& path) {
   }
 }
 
-std::optional<std::filesystem::path> FindDataset(const CatalogueEntry& entry,
+std::optional<std::filesystem::path> FindDataset(const StereoDatasetEntry& entry,
                                                  const std::filesystem::path& root) {
   std::error_code ignored;
   for (const std::string& folder : entry.folders)

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <sgf/io/catalogue.h>
+#include <sgf/io/stereo_layouts.h>
 
 #include "support/error_message.h"
 #include "support/temp_dir.h"
@@ -19,16 +19,14 @@ const std::string kValid = R"(first:
   title: A title
   layout: kitti2015
   folders: [a/b, b]
-  source: ["https://example.org"]
-  licence: free
   scenes: 3
 second: {title: B, layout: middlebury_eval3, folders: [c], generated: true}
 )";
 
-class CatalogueTest : public ::testing::Test {
+class StereoLayoutsTest : public ::testing::Test {
  protected:
-  std::vector<CatalogueEntry> Read(const std::string& text) const {
-    return ReadCatalogue(dir_.Write("catalogue.yaml", text));
+  std::vector<StereoDatasetEntry> Read(const std::string& text) const {
+    return ReadStereoLayouts(dir_.Write("stereo_layouts.yaml", text));
   }
   std::string Message(const std::string& text) const {
     return ErrorMessage([&] { Read(text); });
@@ -36,22 +34,20 @@ class CatalogueTest : public ::testing::Test {
   const TempDir dir_;
 };
 
-TEST_F(CatalogueTest, ReadsEntriesInTheOrderOfTheFile) {
+TEST_F(StereoLayoutsTest, ReadsEntriesInTheOrderOfTheFile) {
   const auto entries = Read(kValid);
   ASSERT_EQ(entries.size(), 2U);
   EXPECT_EQ(entries[0].name, "first");
   EXPECT_EQ(entries[0].title, "A title");
   EXPECT_EQ(entries[0].layout, StereoLayout::kKitti2015);
   EXPECT_THAT(entries[0].folders, ElementsAre("a/b", "b"));
-  EXPECT_THAT(entries[0].source, ElementsAre("https://example.org"));
-  EXPECT_EQ(entries[0].licence, "free");
   EXPECT_EQ(entries[0].scenes, 3);
   EXPECT_FALSE(entries[0].generated);
   EXPECT_EQ(entries[1].name, "second");
   EXPECT_TRUE(entries[1].generated);
 }
 
-TEST_F(CatalogueTest, FindsTheFirstFolderThatExists) {
+TEST_F(StereoLayoutsTest, FindsTheFirstFolderThatExists) {
   const auto entry = Read(kValid)[0];
   EXPECT_FALSE(FindDataset(entry, dir_.path()));
   EXPECT_FALSE(FindDataset(entry, dir_.path() / "missing"));
@@ -61,59 +57,57 @@ TEST_F(CatalogueTest, FindsTheFirstFolderThatExists) {
   EXPECT_EQ(FindDataset(entry, dir_.path()), dir_.path() / "a/b");
 }
 
-TEST_F(CatalogueTest, DoesNotTakeAFileForADataset) {
+TEST_F(StereoLayoutsTest, DoesNotTakeAFileForADataset) {
   dir_.Write("b", "a file");
   EXPECT_FALSE(FindDataset(Read(kValid)[0], dir_.path()));
 }
 
-TEST_F(CatalogueTest, NamesFileLineAndKeyOfWhatIsWrong) {
+TEST_F(StereoLayoutsTest, NamesFileLineAndKeyOfWhatIsWrong) {
   EXPECT_THAT(Message("a:\n  title: A\n  folder: [x]\n"),
-              EndsWith("catalogue.yaml:3: unknown key 'folder'"));
+              EndsWith("stereo_layouts.yaml:3: unknown key 'folder'"));
   EXPECT_THAT(
       Message("a:\n  title: A\n  layout: eth3d\n"),
-      HasSubstr("catalogue.yaml:3: layout is 'eth3d'; known: middlebury_eval3, middlebury2001"));
+      HasSubstr(
+          "stereo_layouts.yaml:3: layout is 'eth3d'; known: middlebury_eval3, middlebury2001"));
   EXPECT_THAT(Message("a: {scenes: many}"),
-              HasSubstr("catalogue.yaml:1: cannot read 'many' as the value of scenes"));
-  EXPECT_THAT(Message(kValid + kValid), EndsWith("catalogue.yaml:9: dataset first is there twice"));
+              HasSubstr("stereo_layouts.yaml:1: cannot read 'many' as the value of scenes"));
+  EXPECT_THAT(Message(kValid + kValid),
+              EndsWith("stereo_layouts.yaml:7: dataset first is there twice"));
   EXPECT_THAT(Message("a: {title: A, layout: kitti2015,\n folders: [ok, /root]}"),
-              EndsWith("catalogue.yaml:2: folder '/root' is not relative to a data root"));
+              EndsWith("stereo_layouts.yaml:2: folder '/root' is not relative to a data root"));
 }
 
-TEST_F(CatalogueTest, NamesWhatAnEntryLacks) {
+TEST_F(StereoLayoutsTest, NamesWhatAnEntryLacks) {
   EXPECT_THAT(Message("\na: {layout: kitti2015, folders: [x]}"),
-              EndsWith("catalogue.yaml:2: dataset a has no title"));
+              EndsWith("stereo_layouts.yaml:2: dataset a has no title"));
   EXPECT_THAT(Message("a: {title: A, folders: [x]}"), EndsWith("dataset a has no layout"));
   EXPECT_THAT(Message("a: {title: A, layout: kitti2015}"), EndsWith("dataset a has no folders"));
   EXPECT_THAT(Message("a: {title: A, layout: kitti2015, folders: []}"),
-              EndsWith("catalogue.yaml:1: expected at least one folder"));
+              EndsWith("stereo_layouts.yaml:1: expected at least one folder"));
   EXPECT_THAT(Message("a:\n"), EndsWith("dataset a has no title"));
 }
 
-TEST_F(CatalogueTest, NamesFileAndLineOfInvalidYaml) {
-  EXPECT_THAT(Message("a: {title: A\nb: ["), HasSubstr("catalogue.yaml:"));
-  EXPECT_THAT(Message("a:\n\t- b"), HasSubstr("catalogue.yaml:2: "));
-  EXPECT_THAT(Message("[a, b]"), EndsWith("catalogue.yaml:1: expected a map of datasets"));
+TEST_F(StereoLayoutsTest, NamesFileAndLineOfInvalidYaml) {
+  EXPECT_THAT(Message("a: {title: A\nb: ["), HasSubstr("stereo_layouts.yaml:"));
+  EXPECT_THAT(Message("a:\n\t- b"), HasSubstr("stereo_layouts.yaml:2: "));
+  EXPECT_THAT(Message("[a, b]"), EndsWith("stereo_layouts.yaml:1: expected a map of datasets"));
   EXPECT_THAT(Message(""), HasSubstr("expected a map of datasets"));
-  EXPECT_THAT(Message("? [a]\n: {}"), HasSubstr("catalogue.yaml:1: "));
-  EXPECT_THAT(Message("a: {title: A, ? [b] : c}"), HasSubstr("catalogue.yaml:1: "));
-  EXPECT_THAT(ErrorMessage([&] { ReadCatalogue(dir_.path() / "none.yaml"); }),
+  EXPECT_THAT(Message("? [a]\n: {}"), HasSubstr("stereo_layouts.yaml:1: "));
+  EXPECT_THAT(Message("a: {title: A, ? [b] : c}"), HasSubstr("stereo_layouts.yaml:1: "));
+  EXPECT_THAT(ErrorMessage([&] { ReadStereoLayouts(dir_.path() / "none.yaml"); }),
               EndsWith("none.yaml: file does not exist"));
 }
 
-TEST(ProjectCatalogue, HasTheDatasetsOfTheTables) {
-  std::map<std::string, CatalogueEntry> entries;
-  for (auto& entry : ReadCatalogue(SGF_SOURCE_DIR "/datasets/catalogue.yaml"))
+TEST(ProjectStereoLayouts, HasTheDatasetsOfTheTables) {
+  std::map<std::string, StereoDatasetEntry> entries;
+  for (auto& entry : ReadStereoLayouts(SGF_SOURCE_DIR "/datasets/stereo_layouts.yaml"))
     entries[entry.name] = entry;
   EXPECT_EQ(entries.at("middlebury2014_q").layout, StereoLayout::kMiddleburyEval3);
   EXPECT_EQ(entries.at("middlebury2014_h").scenes, 15);
   EXPECT_EQ(entries.at("kitti2015").layout, StereoLayout::kKitti2015);
   EXPECT_EQ(entries.at("kitti2012").layout, StereoLayout::kKitti2012);
   EXPECT_TRUE(entries.at("debian_pairs").generated);
-  for (const auto& [name, entry] : entries) {
-    EXPECT_FALSE(entry.source.empty()) << name;
-    EXPECT_FALSE(entry.licence.empty()) << name;
-    EXPECT_GT(entry.scenes, 0) << name;
-  }
+  for (const auto& [name, entry] : entries) EXPECT_GT(entry.scenes, 0) << name;
 }
 
 }  // namespace

@@ -9,15 +9,13 @@
 
 namespace sgf {
 
-/// A dataset that experiments know: where it may lie, how, and where it comes from.
-struct CatalogueEntry {
+/// A stereo dataset that experiments know: where it may lie, and how.
+struct StereoDatasetEntry {
   std::string name;  ///< key of the entry, as experiments and tables call the dataset
   std::string title;
   StereoLayout layout = StereoLayout::kMiddleburyEval3;
   std::vector<std::string> folders;  ///< relative to a data root, in order of preference
-  std::vector<std::string> source;   ///< where to download or install it from
-  std::string licence;
-  int scenes = 0;          ///< in the complete dataset
+  int scenes = 0;                    ///< in the complete dataset
   bool generated = false;  ///< made by the project from installed packages, not downloaded
 
   /// Fields of an entry in the file (see core/options.h); the name is its key there.
@@ -26,21 +24,20 @@ struct CatalogueEntry {
     visit("title", title, "", "name for tables and figures");
     visit("layout", layout, "", "how the files lie in the folder");
     visit("folders", folders, "", "folders under the data root, in order of preference");
-    visit("source", source, "", "where to download or install it from");
-    visit("licence", licence, "", "terms of use");
     visit("scenes", scenes, "", "number of scenes in the complete dataset");
     visit("generated", generated, "", "made from installed packages");
   }
 };
 
-/// Reads a catalogue: a YAML map from names to entries, in the order of the file.
+/// Reads a file as datasets/stereo_layouts.yaml: a YAML map from names to entries, in the order of
+/// the file.
 /// @throws Error naming file and line when it is no valid YAML, for an unknown or repeated key, an
 ///   unreadable value, an entry without title, layout or folders, and a folder that is not
 ///   relative.
-std::vector<CatalogueEntry> ReadCatalogue(const std::filesystem::path& path);
+std::vector<StereoDatasetEntry> ReadStereoLayouts(const std::filesystem::path& path);
 
 /// The first of the entry's folders that exists under a data root.
-std::optional<std::filesystem::path> FindDataset(const CatalogueEntry& entry,
+std::optional<std::filesystem::path> FindDataset(const StereoDatasetEntry& entry,
                                                  const std::filesystem::path& root);
 
 }  // namespace sgf
