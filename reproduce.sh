@@ -193,9 +193,9 @@ mrpt_programs() {
 # --- commands ------------------------------------------------------------------------------------
 
 clean() {
-  rm -rf build/release build/sanitize datasets/generated
+  rm -rf build/release build/sanitize build/fuzz datasets/generated
   find results -mindepth 1 -maxdepth 1 ! -name reference ! -name external -exec rm -rf {} + 2>/dev/null || true
-  echo "Removed build/release, build/sanitize, datasets/generated and all of results but reference and external."
+  echo "Removed build/release, build/sanitize, build/fuzz, datasets/generated and all of results but reference and external."
 }
 
 # What cannot be fetched is said; the run goes on with what is at hand.

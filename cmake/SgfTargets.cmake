@@ -22,6 +22,13 @@ if(SGF_SANITIZE)
   set(sanitizers -fsanitize=address,undefined,float-cast-overflow -fno-sanitize=null,alignment
     -fno-sanitize-recover=all)
 endif()
+# Fuzzers see which branches of the libraries an input takes.
+if(SGF_BUILD_FUZZERS)
+  if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    message(FATAL_ERROR "SGF_BUILD_FUZZERS needs clang, not ${CMAKE_CXX_COMPILER}: use preset fuzz")
+  endif()
+  list(APPEND sanitizers -fsanitize=fuzzer-no-link)
+endif()
 
 function(sgf_compile_options target)
   # Same input, same bits: no contraction to fused multiply-add. errno and floating-point traps are

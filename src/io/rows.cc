@@ -20,7 +20,7 @@ std::optional<int> Exponent(std::string_view text) {
   text.remove_prefix(1);
   if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
   const auto exponent = ParseNumber<int>(text);
-  return exponent && std::abs(*exponent) < 30 ? exponent : std::nullopt;
+  return exponent && *exponent > -30 && *exponent < 30 ? exponent : std::nullopt;
 }
 
 // The number 0.<digits> times 10^shift, rounded.

@@ -11,21 +11,7 @@ namespace sgf::synth {
 
 namespace {
 
-void Check(const ImuOptions& o, double from_s, double to_s) {
-  constexpr double kMaxRate = 1e5;  // Hz
-  if (!(o.rate_hz > 0 && o.rate_hz <= kMaxRate))
-    throw Error("imu", fmt::format("rate_hz is {}; it has to lie in (0, {}]", o.rate_hz, kMaxRate));
-  for (const auto& [name, value] :
-       {std::pair("gravity", o.gravity),
-        std::pair("gyroscope_noise_density", o.noise.gyroscope_noise_density),
-        std::pair("gyroscope_random_walk", o.noise.gyroscope_random_walk),
-        std::pair("accelerometer_noise_density", o.noise.accelerometer_noise_density),
-        std::pair("accelerometer_random_walk", o.noise.accelerometer_random_walk)})
-    if (!(value >= 0 && std::isfinite(value)))
-      throw Error("imu", fmt::format("{} is {}; it has to be 0 or more", name, value));
-  for (const auto& bias : {o.initial_gyroscope_bias, o.initial_accelerometer_bias})
-    for (const double value : bias)
-      if (!std::isfinite(value)) throw Error("imu", fmt::format("an initial bias is {}", value));
+void CheckInterval(double from_s, double to_s) {
   constexpr double kMaxTime_s = 1e6;
   if (!(from_s >= -kMaxTime_s && to_s >= from_s && to_s <= kMaxTime_s))
     throw Error("imu", fmt::format("the interval from {} s to {} s is empty or beyond {} s", from_s,
@@ -64,10 +50,28 @@ class SensorErrors {
 
 }  // namespace
 
+void Check(const ImuOptions& o) {
+  constexpr double kMaxRate = 1e5;  // Hz
+  if (!(o.rate_hz > 0 && o.rate_hz <= kMaxRate))
+    throw Error("imu", fmt::format("rate_hz is {}; it has to lie in (0, {}]", o.rate_hz, kMaxRate));
+  for (const auto& [name, value] :
+       {std::pair("gravity", o.gravity),
+        std::pair("gyroscope_noise_density", o.noise.gyroscope_noise_density),
+        std::pair("gyroscope_random_walk", o.noise.gyroscope_random_walk),
+        std::pair("accelerometer_noise_density", o.noise.accelerometer_noise_density),
+        std::pair("accelerometer_random_walk", o.noise.accelerometer_random_walk)})
+    if (!(value >= 0 && std::isfinite(value)))
+      throw Error("imu", fmt::format("{} is {}; it has to be 0 or more", name, value));
+  for (const auto& bias : {o.initial_gyroscope_bias, o.initial_accelerometer_bias})
+    for (const double value : bias)
+      if (!std::isfinite(value)) throw Error("imu", fmt::format("an initial bias is {}", value));
+}
+
 std::vector<ImuSample> SimulateImu(const Trajectory& trajectory, double from_s, double to_s,
                                    const ImuOptions& options, std::int64_t start_ns,
                                    std::vector<BodyState>* truth) {
-  Check(options, from_s, to_s);
+  Check(options);
+  CheckInterval(from_s, to_s);
   const ImuNoise& noise = options.noise;
   SensorErrors gyro(options.initial_gyroscope_bias, noise.gyroscope_noise_density,
                     noise.gyroscope_random_walk, options, 0);

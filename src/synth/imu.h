@@ -39,6 +39,9 @@ struct ImuOptions {
   }
 };
 
+/// @throws Error for options out of range. SimulateImu() checks them too.
+void Check(const ImuOptions& options);
+
 /// What an inertial sensor at the body's origin, with the body's axes, measures every 1 / rate_hz
 /// seconds on a trajectory:
 ///

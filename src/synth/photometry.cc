@@ -146,23 +146,6 @@ void RequireRadiance(const float* radiance, int width, int y) {
                                           radiance[x], x, y));
 }
 
-PhotometryOptions Checked(const PhotometryOptions& o) {
-  RequirePositive("full_scale_ms", o.full_scale_ms);
-  RequirePositive("noise.full_well_e", o.noise.full_well_e);
-  if (o.noise.full_well_e > kMaxFullWell)
-    throw Error("noise.full_well_e",
-                fmt::format("is {}; the most is {}", o.noise.full_well_e, kMaxFullWell));
-  if (!(o.noise.read_noise_e >= 0 && std::isfinite(o.noise.read_noise_e)))
-    throw Error("noise.read_noise_e",
-                fmt::format("is {}; it must not be negative", o.noise.read_noise_e));
-  if (o.bits != 8 && o.bits != 16)
-    throw Error("bits", fmt::format("is {}; it has to be 8 or 16", o.bits));
-  if (o.vignette.model != VignetteModel::kPolynomial && !o.vignette.coefficients.empty())
-    throw Error("vignette.coefficients", fmt::format("has {} values; only the polynomial has any",
-                                                     o.vignette.coefficients.size()));
-  return o;
-}
-
 double Polynomial(const std::vector<double>& coefficients, double r2) {
   double sum = 0;
   for (size_t i = coefficients.size(); i-- > 0;) sum = (sum + coefficients[i]) * r2;
@@ -214,7 +197,28 @@ void CheckTable(const std::vector<double>& table) {
                                    table[i], table[i - 1]));
 }
 
+PhotometryOptions Checked(const PhotometryOptions& options) {
+  Check(options);
+  return options;
+}
+
 }  // namespace
+
+void Check(const PhotometryOptions& o) {
+  RequirePositive("full_scale_ms", o.full_scale_ms);
+  RequirePositive("noise.full_well_e", o.noise.full_well_e);
+  if (o.noise.full_well_e > kMaxFullWell)
+    throw Error("noise.full_well_e",
+                fmt::format("is {}; the most is {}", o.noise.full_well_e, kMaxFullWell));
+  if (!(o.noise.read_noise_e >= 0 && std::isfinite(o.noise.read_noise_e)))
+    throw Error("noise.read_noise_e",
+                fmt::format("is {}; it must not be negative", o.noise.read_noise_e));
+  if (o.bits != 8 && o.bits != 16)
+    throw Error("bits", fmt::format("is {}; it has to be 8 or 16", o.bits));
+  if (o.vignette.model != VignetteModel::kPolynomial && !o.vignette.coefficients.empty())
+    throw Error("vignette.coefficients", fmt::format("has {} values; only the polynomial has any",
+                                                     o.vignette.coefficients.size()));
+}
 
 std::span<const std::pair<const char*, VignetteModel>> EnumNames(VignetteModel) {
   static constexpr std::array<std::pair<const char*, VignetteModel>, 3> kNames{

@@ -134,6 +134,10 @@ cv::Mat1f Luminance(const cv::Mat3f& rgb);
 /// Linear RGB for people to look at: 8-bit BGR, gamma 2.2, radiance 1 is white.
 cv::Mat3b ForScreen(const cv::Mat3f& radiance);
 
+/// @throws Error naming the option that is out of range whatever the camera; PhotometricCamera
+/// checks the same.
+void Check(const PhotometryOptions& options);
+
 /// Seed of one frame's noise, another one for every camera and frame of a sequence.
 uint64_t FrameSeed(uint64_t seed, int camera, int frame);
 

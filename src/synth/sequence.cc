@@ -73,6 +73,8 @@ void CheckRecipe(const SequenceRecipe& recipe) {
           "at most the time between frames, 50 ms");
   require(recipe.blur_samples >= 1 && recipe.blur_samples % 2 == 1, "blur_samples",
           recipe.blur_samples, "odd and positive");
+  Check(recipe.photometry);  // these two before Estimate() reckons with them
+  Check(recipe.imu);
 }
 
 std::span<const std::pair<const char*, RigModel>> EnumNames(RigModel) {

@@ -15,7 +15,8 @@ namespace sgf::synth {
 namespace {
 
 constexpr int kOrder = 6;  // control poses that act on one interval; the degree is kOrder - 1
-constexpr double kMinInterval_s = 1e-3;
+constexpr double kMinInterval_s = 1e-3, kMaxInterval_s = 3600;
+constexpr double kMaxControlPoses = 1e6;  // an hour's shake has less than a tenth
 constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 using Basis = std::array<std::array<double, kOrder>, kOrder>;
@@ -66,8 +67,16 @@ Blend BlendAt(int j, double u, double interval_s) {
 [[noreturn]] void Fail(const std::string& what) { throw Error("trajectory", what); }
 
 void CheckInterval(double interval_s, const char* name) {
-  if (!(interval_s >= kMinInterval_s && std::isfinite(interval_s)))
-    Fail(fmt::format("{} is {} s; it has to be at least {} s", name, interval_s, kMinInterval_s));
+  if (!(interval_s >= kMinInterval_s && interval_s <= kMaxInterval_s))
+    Fail(fmt::format("{} is {} s; it has to lie in [{}, {}]", name, interval_s, kMinInterval_s,
+                     kMaxInterval_s));
+}
+
+/// Keeps a slip of the pen from deciding how much memory is allocated.
+void CheckPoses(double count, const char* name) {
+  if (count > kMaxControlPoses)
+    Fail(
+        fmt::format("{} asks for {} control poses; the most is {}", name, count, kMaxControlPoses));
 }
 
 /// Fails where the rotation from a pose to the next (or the last to the first) has no short way.
@@ -126,6 +135,7 @@ std::vector<SE3> ControlPoses(std::vector<SE3> waypoints, const TrajectoryOption
     return waypoints;
   }
   const size_t hold_intervals = std::ceil(o.hold_start_s / o.knot_interval_s);
+  CheckPoses(static_cast<double>(hold_intervals), "hold_start_s");
   waypoints.insert(waypoints.begin(), kOrder - 2 + hold_intervals, SE3(waypoints.front()));
   if (!o.periodic) waypoints.insert(waypoints.end(), kOrder - 2, SE3(waypoints.back()));
   return waypoints;
@@ -141,6 +151,7 @@ SE3 Shaken(const SE3& pose, const TrajectoryOptions& o, std::uint64_t index) {
 
 Trajectory Shake(const Trajectory& smooth, const TrajectoryOptions& o) {
   const double end_s = smooth.duration_s();
+  CheckPoses(end_s / o.shake_interval_s, "shake_interval_s");
   const long intervals = std::max(2L, std::lround(end_s / o.shake_interval_s));
   const double interval_s = end_s / intervals;
   // A control pose acts this long before and after its time. Those that act on a rest keep still.

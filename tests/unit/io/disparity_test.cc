@@ -11,7 +11,7 @@
 #include <sgf/io/image.h>
 #include <sgf/io/pfm.h>
 
-#include "encoded_images.h"
+#include "support/encoded_images.h"
 #include "support/error_message.h"
 #include "support/temp_dir.h"
 

@@ -7,7 +7,7 @@
 
 #include <sgf/io/image.h>
 
-#include "encoded_images.h"
+#include "support/encoded_images.h"
 #include "support/error_message.h"
 #include "support/temp_dir.h"
 

@@ -13,7 +13,7 @@
 #include <sgf/io/stereo_layouts.h>
 #include <sgf/io/trajectory.h>
 
-#include "encoded_images.h"
+#include "support/encoded_images.h"
 #include "support/temp_dir.h"
 
 // Whatever stands in a file, a parser gives a result or an sgf::Error: no other exception

@@ -12,7 +12,7 @@
 #include <sgf/io/read_file.h>
 #include <sgf/io/stereo_dataset.h>
 
-#include "encoded_images.h"
+#include "support/encoded_images.h"
 #include "support/error_message.h"
 #include "support/temp_dir.h"
 

@@ -192,6 +192,10 @@ TEST(Sequence, BadRecipes) {
             "short.frames: is 3; it has to be within duration_s");
   EXPECT_EQ(error([](auto& r) { r.blur_samples = 2; }),
             "blur_samples: is 2; it has to be odd and positive");
+  EXPECT_EQ(error([](auto& r) { r.photometry.bits = 1 << 30; }),
+            "bits: is 1073741824; it has to be 8 or 16");
+  EXPECT_THAT(error([](auto& r) { r.imu.rate_hz = 1e300; }),
+              testing::HasSubstr("rate_hz is 1e+300"));
   EXPECT_THAT(error([](auto& r) { r.duration_s = 60; }), testing::StartsWith("duration_s: is 60"));
   EXPECT_THAT(error([](auto& r) { r.exposure.base_ms = -1; }), testing::HasSubstr("-1"));
   EXPECT_THAT(error([](auto& r) { r.exposure.lights = {{.group = "moon"}}; }),

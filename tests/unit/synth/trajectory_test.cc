@@ -372,6 +372,14 @@ TEST(MakeTrajectory, NamesTheOptionAtFault) {
   EXPECT_THAT(error([](O& o) { o.waypoints[2][3] = 240, o.waypoints[2][4] = -5; }),
               HasSubstr("waypoints 1 and 2 are turned by 180 deg"));
   EXPECT_THAT(error([](O& o) { o.knot_interval_s = -1; }), HasSubstr("knot_interval_s is -1 s"));
+  EXPECT_THAT(error([](O& o) { o.knot_interval_s = 1e308; }),
+              HasSubstr("knot_interval_s is 1e+308 s"));
+  EXPECT_THAT(error([](O& o) { o.knot_interval_s = 1e-3, o.hold_start_s = 3600; }),
+              HasSubstr("hold_start_s asks for 3600000 control poses"));
+  EXPECT_THAT(error([](O& o) {
+                o.knot_interval_s = 3600, o.shake_position_m = 0.1, o.shake_interval_s = 1e-3;
+              }),
+              HasSubstr("shake_interval_s asks for"));
   EXPECT_THAT(error([](O& o) { o.hold_start_s = -2; }), HasSubstr("hold_start_s is -2 s"));
   EXPECT_THAT(error([](O& o) { o.shake_interval_s = 0; }), HasSubstr("shake_interval_s is 0 s"));
   EXPECT_THAT(error([](O& o) { o.shake_position_m = -1; }), HasSubstr("shake_position_m is -1"));
