@@ -5,6 +5,8 @@
 #include <fmt/core.h>
 
 #include <sgf/apps/cli.h>
+#include <sgf/core/provenance.h>
+#include <sgf/core/simd.h>
 
 namespace sgf::apps {
 
@@ -36,6 +38,17 @@ YAML::Node LoadYamlFile(const std::string& path) {
   } catch (const YAML::Exception& error) {
     throw Error(fmt::format("{}:{}", path, error.mark.line + 1), error.msg);
   }
+}
+
+YAML::Node DescribeBuild() {
+  const Provenance& build = BuildProvenance();
+  YAML::Node node;
+  node["version"] = build.version;
+  node["revision"] = build.git_revision;
+  node["compiler"] = build.compiler;
+  node["type"] = build.build_type;
+  node["simd"] = ActiveSimdTarget();
+  return node;
 }
 
 void OptionFlags::Add(CLI::App& app, const OptionDoc& doc,

@@ -47,4 +47,7 @@ class OptionFlags {
 /// Reads a YAML file. @throws Error naming the file, and the line of a syntax error.
 YAML::Node LoadYamlFile(const std::string& path);
 
+/// What was built and the instruction set it runs on here, as all tools save it with a run.
+YAML::Node DescribeBuild();
+
 }  // namespace sgf::apps

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <sgf/apps/cli.h>
 #include <sgf/apps/sequence_run.h>
 #include <sgf/core/error.h>
-#include <sgf/core/provenance.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/image.h>
 
@@ -73,8 +73,7 @@ bool ReportClock::Due(size_t done, size_t total) {
 void WriteRunOptions(const std::filesystem::path& file, const YAML::Node& options) {
   YAML::Node node;
   node["options"] = options;
-  node["build"]["version"] = BuildProvenance().version;
-  node["build"]["revision"] = BuildProvenance().git_revision;
+  node["build"] = DescribeBuild();
   WriteTextFile(file, YAML::Dump(node) + "\n");
 }
 

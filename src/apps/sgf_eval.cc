@@ -123,9 +123,13 @@ int main(int argc, char** argv) {
 
   apps::TrajectoryCommand trajectory(app);
 
+  CLI::App* build =
+      app.add_subcommand("build", "print what was built and the instruction set it runs on here");
+
   return apps::RunTool(app, argc, argv, [&] {
     if (*datasets) apps::ListDatasets(data);
     if (*stereo) apps::SweepDataset(data, request);
+    if (*build) fmt::print("{}\n", YAML::Dump(apps::DescribeBuild()));
     if (trajectory.app) trajectory.Run();
   });
 }

@@ -12,7 +12,6 @@
 
 #include <sgf/apps/cli.h>
 #include <sgf/apps/stereo_method.h>
-#include <sgf/core/provenance.h>
 #include <sgf/core/simd.h>
 #include <sgf/eval/disparity.h>
 #include <sgf/io/atomic_file.h>
@@ -132,15 +131,11 @@ void WriteDisparity(const fs::path& folder, const cv::Mat1f& disparity, const Se
 
 void WriteRunOptions(const fs::path& folder, const Arguments& arguments,
                      const YAML::Node& options) {
-  const Provenance& build = BuildProvenance();
   YAML::Node node;
   node["method"] = arguments.method;
   node["fill"] = arguments.fill;
   node["options"] = options;
-  node["build"]["version"] = build.version;
-  node["build"]["revision"] = build.git_revision;
-  node["build"]["compiler"] = build.compiler;
-  node["build"]["simd"] = ActiveSimdTarget();
+  node["build"] = DescribeBuild();
   WriteTextFile(folder / "options.yaml", YAML::Dump(node) + "\n");
 }
 
