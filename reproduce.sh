@@ -19,6 +19,7 @@ usage() {
   cat <<'END'
 Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the experiments
        ./reproduce.sh test [OPTION]...   the same set-up, then the whole test suite
+       ./reproduce.sh --verify           repeat a sample of the runs and compare what they make
 
   --only NAME...  only these experiments (see --list); `tune`, which takes an hour, runs only so
   --data DIR      folder with downloaded data sets; default: environment variable SGF_DATA, or none.
@@ -32,6 +33,9 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --runs N        runs of each line of the tables that repeat runs (odometry, table3);
                   default: a few, for a quick look; rankings take 10, shares of success 25
   --jobs N        parallel jobs; default: the number of processors
+  --verify        run a sample of what was made again, one of each kind and about ten minutes in all, and
+                  compare: bit for bit on the same machine with the same packages and code, else within
+                  paper/tolerances.yaml; exit code 1 if anything differs or nothing was made
   --list          list the experiments and stop
   --clean         remove what was built and generated (not results/reference and results/external) and stop
   --help          show this text and stop
@@ -278,7 +282,7 @@ while (($#)); do
       jobs=$2
       shift
       ;;
-    --list | --clean) mode=${1#--} ;;
+    --list | --clean | --verify) mode=${1#--} ;;
     --help)
       usage
       exit 0
@@ -312,6 +316,10 @@ fi
 case $mode in
   list) list_experiments ;;
   clean) clean ;;
+  verify)
+    cd paper
+    exec "$python" -m sgf_paper.verify --results "$project/results"
+    ;;
   run)
     mkdir -p "$logs"
     run_experiments

@@ -29,6 +29,8 @@ from typing import Any
 import yaml
 
 PROJECT = Path(__file__).resolve().parents[2]
+CACHE = Path(".cache") / "hashes"  # in the results, where runs are started
+DIFFS = Path("runs") / "diffs"
 CACHED_BYTES = 1 << 22  # smaller files are hashed as fast as a hash is looked up
 PACKAGE_SECTIONS = ("run", "report")
 LIBRARIES = ("libc6", "libstdc++6")  # what all programs stand on, and packages.apt need not name
@@ -184,6 +186,20 @@ def describe_build(files: list[Path]) -> dict[str, str]:
     return node if isinstance(node, dict) else {}
 
 
+def conditions(programs: list[Path], inputs: list[Path]) -> dict[str, Any]:
+    """All that a result depends on, besides the command: as it is now, in the results as working directory.
+
+    @param programs where to look for those of the build.
+    """
+    return {
+        "code": describe_code(DIFFS),
+        "inputs": hash_each(inputs, CACHE),
+        "packages": describe_packages(),
+        "processor": describe_processor(),
+        "build": describe_build(programs),
+    }
+
+
 def find_options(outputs: list[Path], inputs: list[Path]) -> dict[str, Any]:
     """All options of a run: the file that its program left of them, or else what it was given."""
     beside = [path / "options.yaml" for path in outputs]
@@ -215,7 +231,6 @@ class Run:
 
     def __init__(self, arguments: argparse.Namespace) -> None:
         self.arguments = arguments
-        self.cache = Path(".cache") / "hashes"
         self.node: dict[str, Any] = {}
 
     @property
@@ -230,11 +245,7 @@ class Run:
         self.node = {
             "rule": self.arguments.rule,
             "command": self.command,
-            "code": describe_code(Path("runs") / "diffs"),
-            "inputs": hash_each(self.arguments.inputs, self.cache),
-            "packages": describe_packages(),
-            "processor": describe_processor(),
-            "build": describe_build([Path(self.command[0]), *self.arguments.inputs]),
+            **conditions([Path(self.command[0]), *self.arguments.inputs], self.arguments.inputs),
         }
 
     def start(self) -> subprocess.Popen:
@@ -250,7 +261,7 @@ class Run:
         self.node |= {
             "options": options,
             "seeds": find_seeds(options, self.command),
-            "outputs": hash_outputs(self.arguments.outputs, self.cache),
+            "outputs": hash_outputs(self.arguments.outputs, CACHE),
         }
         self.write(state)
 

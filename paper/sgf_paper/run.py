@@ -128,11 +128,14 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
     ]  # fmt: skip
 
 
-def _environment(results: Path) -> dict[str, str]:
-    """Caches of Snakemake and matplotlib go to the results: the home may not be writable."""
+def environment(results: Path) -> dict[str, str]:
+    """Caches of Snakemake and matplotlib go to the results: the home may not be writable.
+
+    What writes a date into a file takes that of SOURCE_DATE_EPOCH, not that of the day.
+    """
     cache = results / ".cache"
     folders = {"XDG_CACHE_HOME": str(cache), "MPLCONFIGDIR": str(cache / "matplotlib")}
-    return {**os.environ, **folders}
+    return {"SOURCE_DATE_EPOCH": "0", **os.environ, **folders}
 
 
 def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int) -> bool:
@@ -141,7 +144,7 @@ def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int) 
     with log.open("w") as errors:
         command = _snakemake_command(settings, stages)
         child = subprocess.Popen(
-            command, stderr=errors, pass_fds=[lock_file], env=_environment(settings.results)
+            command, stderr=errors, pass_fds=[lock_file], env=environment(settings.results)
         )
         try:
             code = child.wait()
