@@ -51,6 +51,12 @@ class Judged:
         known = [state for state in (HOLDS, FAILS, OPEN, FEW, MISSING) if state in states]
         return ", ".join(f"{state}: {states.count(state)}" for state in known)
 
+    @property
+    def decisive(self) -> list[Outcome]:
+        """The outcomes that the verdict rests on."""
+        unwanted = {MISSING} if self.verdict == UNDECIDED else {MISSING, FEW}
+        return [outcome for outcome in self.outcomes if outcome.state not in unwanted]
+
 
 class Tables:
     """CSV files of a folder by name; None for one that is not there."""
@@ -112,16 +118,17 @@ def _order(check: Ordering, where: str, lines: pd.DataFrame, rule: Rule) -> list
 def _pair(check: Paired, where: str, lines: pd.DataFrame, rule: Rule) -> list[Outcome]:
     if check.near_duplicates_of:
         lines = pairs.mark_near_duplicates(lines, check.near_duplicates_of)
-    keys = list(dict.fromkeys([*check.pairs, *check.clusters]))
+    keys = [*check.pairs, *check.clusters]
     require_columns(lines, keys, check.table)
+    errors = pairs.side_by_side(lines, check.method, check.quantity, keys)
     outcomes = []
     for other in check.among:
         place = f"{where + ', ' if where else ''}{check.best} / {other}"
-        wide, unpaired = pairs.pair_up(lines, check.method, check.quantity, keys, check.best, other)
+        wide, unpaired = pairs.pair_up(errors, check.best, other)
         if wide.empty:
             outcomes.append(Outcome(place, MISSING, "no pair", check.table))
             continue
-        result = pairs.compare(wide, check.clusters, rule, unpaired)
+        result = pairs.compare(wide, unpaired, check.clusters, rule)
         state = {"better": HOLDS, "worse": FAILS, "equal": FAILS}.get(result.verdict, OPEN)
         p = pairs.sign_flip_p(wide) if result.enough and result.pairs == result.clusters else float("nan")
         number = f"{result}" + (f", sign-flip p = {p:.2g}" if p == p else "")
@@ -219,20 +226,29 @@ class Finding:
 
     claim: Claim
     published: Judged | None  # what the paper's rows allow; None where it has none
-    sources: dict[str, Judged]  # by name, the first counts most
+    sources: dict[str, Judged]  # by name
 
     @property
     def decided_by(self) -> str:
-        """The first source with a verdict, else the first that has measured anything, else the first."""
-        for unwanted in ({UNDECIDED, NOT_MEASURED}, {NOT_MEASURED}):
-            for name, judged in self.sources.items():
-                if judged.verdict not in unwanted:
-                    return name
-        return next(iter(self.sources))
+        """The source with the most outcomes that decide something, the first of those."""
+
+        def weight(name: str) -> tuple[int, int]:
+            states = [outcome.state for outcome in self.sources[name].outcomes]
+            return sum(state not in (FEW, MISSING) for state in states), states.count(FEW)
+
+        return max(self.sources, key=weight)
+
+    @property
+    def by(self) -> str:
+        """What the verdict is of."""
+        if self.claim.checks:
+            return self.decided_by
+        return "the published rows" if self.published else "argument"
 
     @property
     def judged(self) -> Judged:
-        return self.sources[self.decided_by]
+        """The verdict: of the published rows where nothing has to be measured."""
+        return self.sources[self.decided_by] if self.claim.checks or not self.published else self.published
 
 
 def judge(

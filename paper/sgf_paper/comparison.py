@@ -185,6 +185,18 @@ def published_rows(entry: str) -> pd.DataFrame | None:
     return values.rename(columns=dict(zip(("row", "column"), names)))
 
 
+class PublishedRows:
+    """What published_rows() gives, read once."""
+
+    def __init__(self) -> None:
+        self._read: dict[str, pd.DataFrame | None] = {}
+
+    def __call__(self, entry: str) -> pd.DataFrame | None:
+        if entry not in self._read:
+            self._read[entry] = published_rows(entry)
+        return self._read[entry]
+
+
 def averages() -> pd.DataFrame:
     """The printed averages of Table III, the means of their rows, and how far these are apart."""
     rows = published_rows(AVERAGED)

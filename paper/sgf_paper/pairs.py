@@ -58,18 +58,23 @@ class Result:
         )
 
 
-def pair_up(
-    lines: pd.DataFrame, method: str, quantity: str, keys: list[str], own: str, other: str
-) -> tuple[pd.DataFrame, int]:
-    """Errors of two methods side by side, by `keys`, and how many lines have no partner."""
-    wide = lines[lines[method].isin([own, other])].pivot(index=keys, columns=method, values=quantity)
-    wide = wide.reindex(columns=[own, other]).dropna(how="all")
-    whole = wide.dropna()
-    return whole, len(wide) - len(whole)
+def side_by_side(lines: pd.DataFrame, method: str, quantity: str, keys: list[str]) -> pd.DataFrame:
+    """Errors of all methods in columns, a line for what agrees in `keys`."""
+    return lines.pivot(index=list(dict.fromkeys(keys)), columns=method, values=quantity)
 
 
-def compare(wide: pd.DataFrame, clusters: list[str], rule: Rule, unpaired: int = 0) -> Result:
-    """Compares the two columns of errors. @param clusters names of levels of the index."""
+def pair_up(errors: pd.DataFrame, own: str, other: str) -> tuple[pd.DataFrame, int]:
+    """Errors of two methods, and how many have no partner."""
+    either = errors.reindex(columns=[own, other]).dropna(how="all")
+    both = either.dropna()
+    return both, len(either) - len(both)
+
+
+def compare(wide: pd.DataFrame, unpaired: int, clusters: list[str], rule: Rule) -> Result:
+    """Compares the two columns of errors, pair by pair.
+
+    @param unpaired how many had no partner. @param clusters names of levels of the index.
+    """
     own, other = (wide[name].to_numpy(dtype=float) for name in wide.columns)
     keys = list(zip(*(wide.index.get_level_values(name) for name in clusters)))
     estimate = paired.estimate_ratio(own, other, keys)
@@ -117,12 +122,10 @@ def make_table(spec: ReportPairs, lines: pd.DataFrame, rule: Rule) -> pd.DataFra
         lines = mark_near_duplicates(lines, spec.name)
     rows = []
     for where, own_lines in group(lines, spec.groups):
-        for own, other in itertools.combinations(own_lines[spec.method].unique(), 2):
-            for name, clusters in spec.clusters.items():
-                keys = list(dict.fromkeys([*spec.pairs, *clusters]))
-                wide, unpaired = pair_up(own_lines, spec.method, spec.quantity, keys, own, other)
-                result = asdict(compare(wide, clusters, rule, unpaired))
-                rows.append({
-                    "experiment": spec.name, "where": where, "clusters_are": name, "own": own, "other": other, **result,
-                })  # fmt: skip
+        for name, clusters in spec.clusters.items():
+            errors = side_by_side(own_lines, spec.method, spec.quantity, [*spec.pairs, *clusters])
+            for own, other in itertools.combinations(own_lines[spec.method].unique(), 2):
+                result = compare(*pair_up(errors, own, other), clusters, rule)
+                key = {"experiment": spec.name, "where": where, "clusters_are": name, "own": own, "other": other}
+                rows.append({**key, **asdict(result)})
     return pd.DataFrame(rows, columns=ROW)

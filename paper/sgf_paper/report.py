@@ -28,15 +28,20 @@ from sgf_paper.config import Report, ReportItem
 from sgf_paper.report_grid import Grid, Links, Marks, Page
 
 MAIN = config.PAPER / "main.tex"
-CHAPTERS = {"claims": "claims", "slips": "slips", "new": "new"}
+CHAPTERS = ["claims", "slips", "new"]
 PNG_BYTES = 150_000  # larger figures become WebP
 NOT_RUN = "it has not been run; ./reproduce.sh --only {} makes it"
 # What the verdicts of a chapter are called.
 WORDS = {
     "claims": {claims.REPRODUCED: "reproduced", claims.PARTLY: "partly reproduced", claims.NOT: "not reproduced"},
-    "slips": {claims.REPRODUCED: "shown", claims.PARTLY: "partly shown", claims.NOT: "not shown"},
+    "slips": {
+        claims.REPRODUCED: "the exact form does better",
+        claims.PARTLY: "the exact form does better in part",
+        claims.NOT: "the exact form does no better",
+    },
     "new": {claims.REPRODUCED: "holds", claims.PARTLY: "holds in part", claims.NOT: "does not hold"},
 }
+WORDS["published"] = WORDS["new"]
 CLASSES = {claims.REPRODUCED: "pass", claims.PARTLY: "near", claims.NOT: "fail"}
 
 
@@ -96,6 +101,13 @@ def word(chapter: str, verdict: str) -> str:
     return WORDS[chapter].get(verdict, verdict)
 
 
+def title(chapter: str, finding: Finding) -> str:
+    """The verdict on a statement."""
+    if not finding.claim.checks:
+        return "by argument" if finding.published is None else word("published", finding.judged.verdict)
+    return word(chapter, finding.judged.verdict)
+
+
 def read_reasons(listing: Path) -> dict[str, str]:
     """Why experiments were not made in the last run, from lines `name<TAB>reason`."""
     if not listing.exists():
@@ -150,10 +162,10 @@ def compare_methods(report: Report, tables: Tables) -> dict[str, pd.DataFrame]:
 def find(report: Report, sources: dict[str, Tables]) -> dict[str, list[Finding]]:
     """All claims with what the sources and the paper's rows say."""
     rule = pairs.Rule(report.verdict_clusters, report.margin_pct)
-    every = config.load_claims()
+    every, published = config.load_claims(), comparison.PublishedRows()
     return {
-        chapter: [claims.judge(claim, sources, comparison.published_rows, rule) for claim in getattr(every, field)]
-        for chapter, field in CHAPTERS.items()
+        chapter: [claims.judge(claim, sources, published, rule) for claim in getattr(every, chapter)]
+        for chapter in CHAPTERS
     }
 
 
@@ -166,7 +178,7 @@ def gather(name: str, results: Path, reasons: dict[str, str], main_file: Callabl
     values = comparison.compare(tables)
     marks = Marks(values)
     studies = report_grid.load_studies([part.name for part in parts])
-    stereo = [config.load_experiment(part.name) for part in parts if part.name in config.load_experiments("table")]
+    stereo = list(config.load_experiments("table").values())
     links = Links(results)
     return Contents(
         report=report,
@@ -206,15 +218,16 @@ def write_html(contents: Contents, results: Path, no_pdf: str) -> None:
         name: data_uri(results / "figures" / f"{name}.png") for shown in contents.items for name in shown.figures
     }
     document = text.render(
-        "report.html.j2", c=contents, figures=figures, no_pdf=no_pdf, word=word, classes=CLASSES
-    )
+        "report.html.j2", c=contents, figures=figures, no_pdf=no_pdf, word=word, title=title,
+        classes=CLASSES,
+    )  # fmt: skip
     write_whole(results / "report.html", document)
 
 
 def write_fragments(contents: Contents, folder: Path) -> None:
     """Writes what main.tex reads, and main.tex beside it."""
     folder.mkdir(parents=True, exist_ok=True)
-    context = {"c": contents, "word": word}
+    context = {"c": contents, "word": word, "title": title}
     for name in ("values", "pairs", "parts"):
         write_whole(folder / f"{name}.tex", text.render(f"report_{name}.tex.j2", **context))
     for chapter, findings in contents.findings.items():
@@ -254,7 +267,8 @@ def claim_table(contents: Contents) -> pd.DataFrame:
             own = {"chapter": chapter, "id": finding.claim.id, "place": finding.claim.place}
             sources = {**finding.sources, **({"published rows": finding.published} if finding.published else {})}
             for source, judged in sources.items():
-                head = {**own, "source": source, "verdict": word(chapter, judged.verdict), "reason": judged.reason}
+                called = word("published" if judged is finding.published else chapter, judged.verdict)
+                head = {**own, "source": source, "verdict": called, "reason": judged.reason}
                 lines += [
                     {**head, "table": o.table, "where": o.where, "outcome": o.state, "number": o.number}
                     for o in judged.outcomes
@@ -262,9 +276,19 @@ def claim_table(contents: Contents) -> pd.DataFrame:
     return pd.DataFrame(lines)
 
 
+def verdict_table(contents: Contents) -> pd.DataFrame:
+    """A line for each statement."""
+    return pd.DataFrame([
+        {"chapter": chapter, "id": finding.claim.id, "verdict": title(chapter, finding), "by": finding.by}
+        for chapter, findings in contents.findings.items()
+        for finding in findings
+    ])  # fmt: skip
+
+
 def write_csvs(contents: Contents, tables: Path, name: str) -> None:
     """Writes the verdicts, the values and the pairs as tables."""
     tables.mkdir(parents=True, exist_ok=True)
+    verdict_table(contents).to_csv(tables / f"{name}_verdicts.csv", index=False)
     claim_table(contents).to_csv(tables / f"{name}_claims.csv", index=False)
     contents.values.round(6).to_csv(tables / f"{name}_values.csv", index=False)
     every = list(contents.pairs.values()) or [pd.DataFrame(columns=pairs.ROW)]
