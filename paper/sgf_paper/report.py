@@ -1,8 +1,8 @@
 """The report: results/report.html, one file that needs no network, and results/report.pdf by LaTeX.
 
-It is made of what is there. What is not there is named with its reason, and no cell is empty without one. It says of each
-claim of the paper what the runs show of it, and marks values as near to the paper's only where they can be compared.
-The same results give the same bytes.
+It is made of what is there. What is not there is named with its reason, and no cell is empty without one. It says of
+each claim of the paper what the runs show of it, and marks values as near to the paper's only where they can be
+compared. The same results give the same bytes.
 """
 
 from __future__ import annotations
@@ -127,17 +127,17 @@ def list_parts(results: Path, reasons: dict[str, str], main_file: Callable) -> l
     return parts
 
 
-def show_item(item: ReportItem, part: Part, results: Path, marks: Marks) -> ShownItem:
+def show_item(item: ReportItem, part: Part, results: Path, links: Links, marks: Marks) -> ShownItem:
     """What there is of a table or figure."""
     if part.reason:
         return ShownItem(item, part.reason, [], [], [], [])
-    tables, links = results / "tables", Links(results)
+    tables = results / "tables"
     experiment = config.load_experiment(item.name)
     grids: list[Grid] = []
     if experiment.kind == "table":
         grids = report_grid.stereo_grids(experiment, tables, links, marks)
     elif experiment.kind == "joined_table":
-        grids = report_grid.joined_grids(experiment, tables, marks)
+        grids = report_grid.joined_grids(experiment, tables, links, marks)
     own = [(spec, report_grid.csv_grid(spec, tables, links)) for spec in item.tables]
     grids += [grid for _, grid in own if grid]
     return ShownItem(
@@ -169,6 +169,14 @@ def find(report: Report, sources: dict[str, Tables]) -> dict[str, list[Finding]]
     }
 
 
+def list_pages(results: Path, parts: list[Part]) -> list[Page]:
+    """All scenes, then all sequences."""
+    stereo = list(config.load_experiments("table").values())
+    studies = report_grid.load_studies([part.name for part in parts])
+    tables, links = results / "tables", Links(results)
+    return [*report_grid.scene_pages(stereo, tables, links), *report_grid.sequence_pages(studies, tables, links)]
+
+
 def gather(name: str, results: Path, reasons: dict[str, str], main_file: Callable) -> Contents:
     """Everything that the report shows."""
     report = config.load_experiment(name)
@@ -177,20 +185,16 @@ def gather(name: str, results: Path, reasons: dict[str, str], main_file: Callabl
     by_name = {part.name: part for part in parts}
     values = comparison.compare(tables)
     marks = Marks(values)
-    studies = report_grid.load_studies([part.name for part in parts])
-    stereo = list(config.load_experiments("table").values())
-    links = Links(results)
+    pages = list_pages(results, parts)
+    links = Links(results, pages)
     return Contents(
         report=report,
         findings=find(report, {claims.THIS_RUN: tables, claims.REFERENCE: Tables(config.REFERENCE)}),
         values=values,
         pairs=compare_methods(report, tables),
-        items=[show_item(item, by_name[item.name], results, marks) for item in report.items],
+        items=[show_item(item, by_name[item.name], results, links, marks) for item in report.items],
         parts=parts,
-        pages=[
-            *report_grid.scene_pages(stereo, results / "tables", links),
-            *report_grid.sequence_pages(studies, results / "tables", links),
-        ],
+        pages=pages,
         averages=comparison.averages(),
     )
 

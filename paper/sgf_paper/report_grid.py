@@ -3,7 +3,7 @@ value is where that can be said."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -70,13 +70,14 @@ def empty(reason: str) -> Cell:
 
 
 class Links:
-    """What made a value, below the results; empty where it is no longer there."""
+    """What made a value, below the results or further down on the page; empty where it is not there."""
 
-    def __init__(self, results: Path):
+    def __init__(self, results: Path, pages: Iterable[Page] = ()):
         self.results = results
+        self.anchors = {f"#{page.anchor}" for page in pages}
 
     def __call__(self, path: str) -> str:
-        return path if path and (self.results / path).exists() else ""
+        return path if path in self.anchors or path and (self.results / path).exists() else ""
 
 
 def csv_grid(spec: ReportTable, folder: Path, links: Links) -> Grid | None:
@@ -133,16 +134,17 @@ def _stereo_grid(table: Table, block: text.Block, kind: str, links: Links, marks
     missing = "no pixel is matched" if block.scenes else f"{block.dataset} is not at hand"
     rows = []
     for row in block.rows:
-        href = links(f"raw/{matcher}/{block.dataset}/{row.cost}.csv")
-        name = Cell(row.cost + (" (extra)" if row.extra else ""), href=links(f"raw/{matcher}/{block.dataset}/{row.cost}.options.yaml"))
-        cells = [name]
+        scores = f"raw/{matcher}/{block.dataset}/{row.cost}"
+        href = links(f"{scores}.csv")
+        cells = [Cell(row.cost + (" (extra)" if row.extra else ""), href=links(f"{scores}.options.yaml"))]
         for quantity, cell in zip(table.quantities, row.cells):
             mark = marks(table.name, f"{matcher}, {block.region}", row.cost, quantity, quantity) if marks else ""
             cells.append(_stereo_cell(cell, missing, href, mark))
         rows.append([*cells, _won_cell(row, block, kind)])
     title = f"{block.dataset}, {block.region}, {block.matcher}, {kind} ({scenes})"
     head = ["cost", *(text.LABELS[quantity] for quantity in table.quantities), "scenes won"]
-    return Grid(title, head, rows, "In brackets: published. A cost links to its options, a value to the scores of its scenes.")
+    note = "In brackets: published. A cost links to its options, a value to the scores of its scenes."
+    return Grid(title, head, rows, note)
 
 
 def _stereo_cell(cell: text.Cell, missing: str, href: str, mark: str) -> Cell:
@@ -161,7 +163,7 @@ def _won_cell(row: text.Row, block: text.Block, kind: str) -> Cell:
     return empty("counted for fixed parameters only" if block.scenes else f"{block.dataset} is not at hand")
 
 
-def joined_grids(joined: JoinedTable, folder: Path, marks: Marks) -> list[Grid]:
+def joined_grids(joined: JoinedTable, folder: Path, links: Links, marks: Marks) -> list[Grid]:
     """Table III, a block for each data set and condition."""
     light = pd.read_csv(folder / f"{joined.name}_light.csv")
     undisturbed = pd.read_csv(folder / f"{joined.name}.csv").assign(condition=joined_table.UNDISTURBED)
@@ -170,21 +172,22 @@ def joined_grids(joined: JoinedTable, folder: Path, marks: Marks) -> list[Grid]:
     run = set(lines.loc[lines["runs"] > 0, "system"])
     others = sorted(set(lines["system"]) - own | run & set(joined.published))
     systems = joined_table.list_systems(joined, others)
-    return [_joined_grid(joined, block, marks) for block in joined_table.make_blocks(joined, systems, lines)]
+    return [_joined_grid(joined, block, links, marks) for block in joined_table.make_blocks(joined, systems, lines)]
 
 
-def _joined_grid(joined: JoinedTable, block: dict, marks: Marks) -> Grid:
+def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks) -> Grid:
     labels = {"_".join(name.split("_")[:2]): (name, label) for name, label in joined_table.labels_of(joined).items()}
     euroc = block["title"].startswith("euroc,")
     heads = [*block["sequences"], "average", "success", "coverage %"]
     rows = []
     for row in block["rows"]:
         published = row["label"].split("(")[-1].rstrip(")")
+        own = row["group"] in (joined_table.REBUILT, joined_table.BEYOND)
         cells = [Cell(row["label"] + (f" [{row['group']}]" if row["group"] != joined_table.REBUILT else ""))]
         for head, cell in zip(heads, row["cells"]):
             name, label = labels.get(head, ("", "avg"))
             mark = marks(joined.name, "", published, label, "ate_mean_m") if euroc and not cell.reason else ""
-            href = f"#{PAGES['sequence'].format(name)}" if name and not cell.reason else ""
+            href = links(f"#{PAGES['sequence'].format(name)}") if own and not cell.reason else ""
             cells.append(Cell(cell.shown, block["reasons"].get(cell.reason, ""), href, mark))
         rows.append(cells)
     note = (
@@ -192,6 +195,11 @@ def _joined_grid(joined: JoinedTable, block: dict, marks: Marks) -> Grid:
         " infinite wherever methods are compared. In brackets: published."
     )
     return Grid(block["title"], ["system", *heads], rows, note)
+
+
+def _page(pages: dict[str, Page], kind: str, title: str, *key: str) -> Page:
+    """The page of that title, begun if there is none."""
+    return pages.setdefault(title, Page(PAGES[kind].format(*key), title))
 
 
 def scene_pages(tables: list[Table], folder: Path, links: Links) -> list[Page]:
@@ -203,19 +211,16 @@ def scene_pages(tables: list[Table], folder: Path, links: Links) -> list[Page]:
             continue
         lines = pd.read_csv(path, dtype=str, keep_default_na=False)
         for (dataset, scene), own in lines.groupby(["dataset", "scene"], sort=False):
-            page = pages.setdefault(f"{dataset}/{scene}", Page(PAGES["scene"].format(dataset, scene), f"{dataset}: {scene}"))
+            page = _page(pages, "scene", f"{dataset}: {scene}", dataset, scene)
             page.grids.append(_scene_grid(table, own.drop(columns=["dataset", "scene"]), dataset, links))
     return list(pages.values())
 
 
 def _scene_grid(table: Table, lines: pd.DataFrame, dataset: str, links: Links) -> Grid:
-    rows = [
-        [
-            empty("no pixel is matched") if shown == "" else _csv_cell(shown, "", links(f"raw/{line['matcher']}/{dataset}/{line['cost']}.csv"))
-            for shown in line.values()
-        ]
-        for line in lines.to_dict("records")
-    ]
+    rows = []
+    for line in lines.to_dict("records"):
+        href = links(f"raw/{line['matcher']}/{dataset}/{line['cost']}.csv")
+        rows.append([_csv_cell(shown, "no pixel is matched", href) for shown in line.values()])
     return Grid(f"{table.title}: fixed parameters", list(lines.columns), rows)
 
 
@@ -228,7 +233,7 @@ def sequence_pages(studies: dict[str, Callable[[str], str]], folder: Path, links
             continue
         lines = pd.read_csv(path, dtype=str, keep_default_na=False)
         for sequence, own in lines.groupby("sequence", sort=False):
-            page = pages.setdefault(called(sequence), Page(PAGES["sequence"].format(called(sequence)), called(sequence)))
+            page = _page(pages, "sequence", called(sequence), called(sequence))
             page.grids.append(_runs_grid(name, sequence, own.drop(columns="sequence"), links))
     return list(pages.values())
 
@@ -238,7 +243,8 @@ def _runs_grid(name: str, sequence: str, lines: pd.DataFrame, links: Links) -> G
     for line in lines.to_dict("records"):
         href = links(f"raw/{name}/{sequence}/run_{line['run']}/{line['condition']}/{line['column']}")
         rows.append([_run_cell(column, shown, href) for column, shown in line.items()])
-    return Grid(f"{name}: runs on {sequence}", list(lines.columns), rows, "∞: the run fails. A value links to its run.")
+    note = "∞: the run fails. A value links to its run."
+    return Grid(f"{name}: runs on {sequence}", list(lines.columns), rows, note)
 
 
 def _run_cell(column: str, shown: str, href: str) -> Cell:

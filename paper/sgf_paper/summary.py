@@ -233,7 +233,8 @@ def _counted(words: pd.Series) -> str:
 
 def _report_lines(page: Path) -> list[str]:
     """Statements by their verdicts, the paper's values by their marks, and whether there is a PDF."""
-    verdicts, values = (pd.read_csv(page.parent / "tables" / f"{page.stem}_{end}.csv") for end in ("verdicts", "values"))
+    tables = page.parent / "tables"
+    verdicts, values = (pd.read_csv(tables / f"{page.stem}_{end}.csv") for end in ("verdicts", "values"))
     lines = [f"{chapter}: {_counted(own['verdict'])}" for chapter, own in verdicts.groupby("chapter", sort=False)]
     lines.append(f"values of the paper: {_counted(values['mark'].replace('–', 'not compared'))}")
     return lines + ([] if page.with_suffix(".pdf").exists() else ["no PDF: latexmk is not installed"])

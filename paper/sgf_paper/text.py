@@ -138,10 +138,12 @@ def flatten(options: dict, prefix: str = "") -> list[str]:
 
 LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
-    **{"\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}", "∞": "$\\infty$", "–": "--"},
-    **{"−": "$-$", "×": "$\\times$", "°": "$^\\circ$", "ε": "$\\varepsilon$", "≥": "$\\geq$", "≤": "$\\leq$"},
+    **{"\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}"},
+    **{"∞": "$\\infty$", "–": "--", "−": "$-$", "×": "$\\times$", "°": "$^\\circ$", "ε": "$\\varepsilon$"},
+    **{"≥": "$\\geq$", "≤": "$\\leq$"},
     **{character: f"${character}$" for character in "<>|"},
 }
+
 
 def _latex(text: object) -> str:
     return "".join(LATEX.get(character, character) for character in str(text))

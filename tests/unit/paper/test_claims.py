@@ -101,7 +101,8 @@ def test_pairs_decide_where_there_are_enough():
     assert states(PAIR, scenes(1.01 * sad, sad)) == [FAILS]  # equal is not better
     assert states(PAIR, scenes(sad * np.tile([0.5, 2], 6), sad)) == [OPEN]
     assert states(PAIR, scenes(0.5 * sad[:9], sad[:9])) == [FEW]
-    assert outcomes(PAIR, scenes(0.5 * sad, sad))[0].number.startswith("0.50 [0.50, 0.50], 12 won, 0 lost, 0 tied of 12: better")
+    number = outcomes(PAIR, scenes(0.5 * sad, sad))[0].number
+    assert number.startswith("0.50 [0.50, 0.50], 12 won, 0 lost, 0 tied of 12: better")
 
 
 def test_near_duplicates_are_one_pair():
@@ -141,8 +142,15 @@ def test_lines_without_a_partner_are_left_out_and_counted():
 
 @pytest.mark.parametrize(
     "low, high, count, state",
-    [(1, 3, 12, HOLDS), (-3, -1, 12, FAILS), (-3, 0, 12, FAILS), (-1, 3, 12, OPEN), (1, 3, 9, FEW), (math.nan, math.nan, 12, MISSING)],
-)  # fmt: skip
+    [
+        (1, 3, 12, HOLDS),
+        (-3, -1, 12, FAILS),
+        (-3, 0, 12, FAILS),
+        (-1, 3, 12, OPEN),
+        (1, 3, 9, FEW),
+        (math.nan, math.nan, 12, MISSING),
+    ],
+)
 def test_an_interval_lies_above_or_below(low, high, count, state):
     frame = pd.DataFrame([{"gain": 2, "low": low, "high": high, "pairs": count}])
     check = Interval("t", "gain", "low", "high", "pairs", above=0)

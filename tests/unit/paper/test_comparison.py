@@ -68,7 +68,8 @@ def test_rendered_flights_and_cuts_are_not_marked(dataset):
 
 
 def test_figure_1_is_never_marked_as_its_change_is_not_stated():
-    line = {"group": "icl_kt2", "frame": 120, "case": "noise_free", "cost": "sgf", "first_disparity": 0, "mean_px": 1.21}
+    key = {"group": "icl_kt2", "frame": 120, "case": "noise_free", "cost": "sgf"}
+    line = {**key, "first_disparity": 0, "mean_px": 1.21}
     found = line_of(compare(fig1=[line]), table="fig1", row="sgf", column="120")
     assert found["measured"] == 1.21 and found["mark"] == "–" and "does not state" in found["reason"]
 
