@@ -92,7 +92,7 @@ def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
         return stage.group(datasets) is not None
     if stage.kind in (
         "contact_sheet", "convergence", "direct_map", "joined_table", "mrpt_map", "odometry", "self_match",
-        "semi_dense", "sequences", "shift_profile", "trajectory_table", "tuning",
+        "report", "semi_dense", "sequences", "shift_profile", "trajectory_table", "tuning",
     ):  # fmt: skip
         return True  # rendered
     return stage.pair(datasets) is not None
@@ -138,9 +138,9 @@ def environment(results: Path) -> dict[str, str]:
     return {"SOURCE_DATE_EPOCH": "0", **os.environ, **folders}
 
 
-def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int) -> bool:
+def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int, log_name: str = "snakemake") -> bool:
     """Runs Snakemake; its own text goes to a log, progress lines to the standard output."""
-    log = settings.logs / "snakemake.log"
+    log = settings.logs / f"{log_name}.log"
     with log.open("w") as errors:
         command = _snakemake_command(settings, stages)
         child = subprocess.Popen(
@@ -173,9 +173,36 @@ def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in obstacles.items())
         raise RunError(f"nothing can be made ({reasons}); see the lines above, or give --data")
     print(f"== experiments: {' '.join(stage.name for stage in runnable)}", flush=True)
-    passed = run_snakemake(settings, runnable, lock_file)
+    passed = run_in_turn(settings, runnable, obstacles, lock_file)
     print_summary(settings, stages, obstacles, datasets, started)
     return passed
+
+
+def run_in_turn(
+    settings: Settings, runnable: list[Experiment], obstacles: dict[str, str], lock_file: int
+) -> bool:
+    """Makes all stages but reports, then these of whatever was made; true if nothing failed."""
+    reports = [stage for stage in runnable if stage.kind == "report"]
+    others = [stage for stage in runnable if stage.kind != "report"]
+    passed = run_snakemake(settings, others, lock_file) if others else True
+    if reports:
+        write_reasons(settings, others, obstacles)
+        passed &= run_snakemake(settings, reports, lock_file, "snakemake_report")
+    return passed
+
+
+def write_reasons(settings: Settings, stages: list[Experiment], obstacles: dict[str, str]) -> None:
+    """Lists in results/stages.tsv what was not made and why; leaves the file alone if it says so already."""
+    failed = {
+        stage.name: "it failed; the run's output names the log"
+        for stage in stages
+        if not summary.main_file(stage, settings.results).exists()
+    }
+    reasons = {**{name: reason for name, reason in obstacles.items() if reason}, **failed}
+    listing = settings.results / "stages.tsv"
+    lines = "".join(f"{name}\t{reason}\n" for name, reason in sorted(reasons.items()))
+    if not listing.exists() or listing.read_text() != lines:
+        listing.write_text(lines)
 
 
 def print_summary(

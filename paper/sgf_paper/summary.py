@@ -22,6 +22,7 @@ FILES = {
     "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "mrpt_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "odometry": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _compared.csv, _runs.csv)",
+    "report": "report.html, report.pdf, tables/{0}_verdicts.csv (_claims.csv, _values.csv, _pairs.csv)",
     "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
     "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
@@ -41,6 +42,7 @@ MAIN_FILE = {
     "convergence": "tables/{}.csv",
     "mrpt_map": "tables/{}.csv",
     "odometry": "tables/{}.csv",
+    "report": "{}.html",
     "sequences": "tables/{}.csv",
     "semi_dense": "tables/{}.csv",
     "self_match": "tables/{}.csv",
@@ -226,6 +228,19 @@ def _tuning_lines(path: Path) -> list[str]:
     ]
 
 
+def _counted(words: pd.Series) -> str:
+    return ", ".join(f"{word} {count}" for word, count in words.value_counts(sort=False).items())
+
+
+def _report_lines(page: Path) -> list[str]:
+    """Statements by their verdicts, the paper's values by their marks, and whether there is a PDF."""
+    tables = page.parent / "tables"
+    verdicts, values = (pd.read_csv(tables / f"{page.stem}_{end}.csv") for end in ("verdicts", "values"))
+    lines = [f"{chapter}: {_counted(own['verdict'])}" for chapter, own in verdicts.groupby("chapter", sort=False)]
+    lines.append(f"values of the paper: {_counted(values['mark'].replace('–', 'not compared'))}")
+    return lines + ([] if page.with_suffix(".pdf").exists() else ["no PDF: latexmk is not installed"])
+
+
 def _measured(stage: Experiment, results: Path) -> list[str]:
     if stage.kind == "table":
         return _table_lines(main_file(stage, results))
@@ -245,6 +260,8 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
         return _mrpt_map_lines(main_file(stage, results))
     if stage.kind == "odometry":
         return _odometry_lines(main_file(stage, results))
+    if stage.kind == "report":
+        return _report_lines(main_file(stage, results))
     if stage.kind == "self_match":
         return _self_match_lines(main_file(stage, results))
     if stage.kind == "trajectory_table":

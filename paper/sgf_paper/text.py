@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
+import markupsafe
 import pandas as pd
 
 from sgf_paper import config
@@ -134,11 +136,29 @@ def flatten(options: dict, prefix: str = "") -> list[str]:
     return texts
 
 
+LATEX = {
+    **{character: f"\\{character}" for character in "&%$#_{}"},
+    **{"\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}"},
+    **{"∞": "$\\infty$", "–": "--", "−": "$-$", "×": "$\\times$", "°": "$^\\circ$", "ε": "$\\varepsilon$"},
+    **{"≥": "$\\geq$", "≤": "$\\leq$"},
+    **{character: f"${character}$" for character in "<>|"},
+}
+
+
 def _latex(text: object) -> str:
-    escaped = str(text)
-    for character in "&%$#_{}":
-        escaped = escaped.replace(character, "\\" + character)
-    return escaped
+    return "".join(LATEX.get(character, character) for character in str(text))
+
+
+def _latex_prose(text: object) -> str:
+    """Escaped text; e_sgf and its kin become symbols, names in back ticks typewriter text."""
+    marked = re.sub(r"\be\\_([a-z]+\d?)\b", r"$e_\\mathrm{\1}$", _latex(text))
+    return re.sub(r"`([^`]+)`", r"\\texttt{\1}", marked)
+
+
+def _html_prose(text: object) -> markupsafe.Markup:
+    """As _latex_prose() for a web page."""
+    marked = re.sub(r"\be_([a-z]+\d?)\b", r"<i>e</i><sub>\1</sub>", str(markupsafe.escape(text)))
+    return markupsafe.Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", marked))
 
 
 def render(template: str, **context: object) -> str:
@@ -146,10 +166,13 @@ def render(template: str, **context: object) -> str:
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(config.PAPER / "templates"),
         undefined=jinja2.StrictUndefined,
+        autoescape=jinja2.select_autoescape(["html.j2"], default=False),
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
     environment.filters["latex"] = _latex
+    environment.filters["latex_prose"] = _latex_prose
+    environment.filters["html_prose"] = _html_prose
     environment.filters["matcher"] = matcher_title
     return environment.get_template(template).render(**context)

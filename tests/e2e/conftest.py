@@ -129,7 +129,7 @@ class Project:
     def run(self, *arguments, **environment):
         """Runs reproduce.sh; its exit code and what it printed."""
         process = self.start(*arguments, **environment)
-        output, _ = process.communicate(timeout=240)
+        output, _ = process.communicate(timeout=600)
         return process.returncode, output
 
     def calls(self):

@@ -21,7 +21,7 @@ PARTS = ["table3_dso", "table3_vio"]
 TRACKED = [*ODOMETRY, *PARTS]
 # These need no data set.
 DRAWN = ["convergence", "fig1", "fig2", "fig3", "fig6", "mrpt_map", *TRACKED, "table3", "scenes", "sequences"]
-RENDERED = [*DRAWN, "tune_tiny"]
+RENDERED = [*DRAWN, "report", "tune_tiny"]
 SHORT = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 PICTURES = ["density", *DRAWN, "fig1_curves", "fig4", "fig5", "light_change"]
 FILES = {
@@ -37,6 +37,7 @@ FILES = {
     + [f"{name}{end}" for name in PARTS for end in ("_ate_compared.csv", ".tex")]
     + [f"table3{end}" for end in (".csv", "_light.csv", "_timings.csv", ".md", ".tex")]
     + ["tune_tiny.csv", "tune_tiny.md"]
+    + [f"report{end}.csv" for end in ("_claims", "_pairs", "_values", "_verdicts")]
     + ["fig3.csv", "fig3.md", "sequences.csv", "sequences.md", "light_change.csv", "light_change.md"],
     "figures": [f"{name}.{end}" for name in PICTURES for end in ("pdf", "png")],
 }
@@ -80,6 +81,10 @@ def test_everything_is_made_once_and_then_up_to_date(project):
     assert "V1_02_medium: 10 of 10 frames with pose, 2 key-frames, 3 points, ATE RMSE 1.0 mm" in summary
     assert "spread of walls: photo 1.0 mm, 1.0 cm, 0.0 cm; sgf 1.0 mm, 1.0 cm, 0.0 cm" in summary
     assert "sequences      made        figures/sequences.png (.pdf), tables/sequences.md" in summary
+    assert "values of the paper: not compared 235" in summary
+    page = (project.results / "report.html").read_text()
+    assert "Not shown: it has not been run; ./reproduce.sh --only tune makes it." in page
+    assert page.count("Not shown:") == 1 and 'href="raw/stereo_bm/debian_pairs/sgf.csv"' in page
     assert "Data sets absent: middlebury2014_h (https://" in summary
 
     times = {path: path.stat().st_mtime_ns for path in project.results.glob("*/*.*")}
@@ -188,6 +193,19 @@ def test_a_failing_job_names_its_log_and_leaves_the_rest_standing(project):
     code, output = project.run("--only", "table1", "fig4")
     assert code == 0
     assert sorted(project.calls()) == sorted(f"debian_pairs {column}" for column in COLUMNS)
+
+
+def test_the_report_is_made_of_what_was_made_and_names_what_failed(project):
+    project.fail("stereo_bm/pm")
+    code, output = project.run("--only", "table1", "fig4", "report")
+    assert code == 1 and "table1         NOT MADE" in output and "report         made" in output
+    page = (project.results / "report.html").read_text()
+    assert "Not shown: it failed; the run's output names the log." in page.replace("&#39;", "'")
+    assert 'alt="fig4' in page and "Not shown: it has not been run; ./reproduce.sh --only table2" in page
+    for state in ("made", "up to date"):
+        code, output = project.run("--only", "report")
+        assert code == 0 and f"report         {state}" in output
+    assert "./reproduce.sh --only table1 makes it" in (project.results / "report.html").read_text()
 
 
 def test_an_interrupted_run_goes_on_where_it_stopped(project, interrupt):

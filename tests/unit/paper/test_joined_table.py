@@ -258,7 +258,7 @@ def test_documents_lead_to_the_parts_and_explain_themselves(made):
     latex = (made / "table3.tex").read_text()
     assert "vio\\_lssd (basalt) & 0.0800 (0.076) & (0.045)$^a$ &" in latex
     assert "\\multicolumn{15}{l}{\\emph{published}} \\\\" in latex and "basalt & 0.076 & 0.045" in latex
-    assert latex.count("\\begin{tabular}") == latex.count("\\end{tabular}") == 5
+    assert latex.count("\\begin{longtable}") == latex.count("\\end{longtable}") == 5
 
 
 def test_timings_have_a_file_of_their_own(made):

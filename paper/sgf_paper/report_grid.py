@@ -1,0 +1,268 @@
+"""Tables of the report: cells with the reason why they are empty, a link to what made them, and how near the paper's
+value is where that can be said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+
+from sgf_paper import claims, comparison, config, joined_table, text
+from sgf_paper.config import JoinedTable, ReportTable, Table, TrajectoryTable
+
+NO_VALUE = "the table has no value here"
+PAGES = {"scene": "scene-{}-{}", "sequence": "sequence-{}"}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A value as text; without one there is a reason."""
+
+    shown: str
+    reason: str = ""
+    href: str = ""  # relative to the results, or an anchor
+    mark: str = ""  # pass, near or fail
+    best: bool = False
+
+
+@dataclass(frozen=True)
+class Grid:
+    title: str
+    head: list[str]
+    rows: list[list[Cell]]
+    note: str = ""
+
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Letters of the reasons in the table."""
+        found = dict.fromkeys(cell.reason for row in self.rows for cell in row if cell.reason)
+        return {reason: _letters(index) for index, reason in enumerate(found)}
+
+
+@dataclass(frozen=True)
+class Page:
+    """All lines of one scene or sequence."""
+
+    anchor: str
+    title: str
+    grids: list[Grid] = field(default_factory=list)
+
+
+def _letters(index: int) -> str:
+    """a to z, then aa, ab, ..."""
+    return (_letters(index // 26 - 1) if index >= 26 else "") + chr(ord("a") + index % 26)
+
+
+def number(shown: str) -> str:
+    """A number of a CSV file with four significant digits; other text as it is."""
+    if "." not in shown and shown != "inf":
+        return shown
+    try:
+        return claims.shown(float(shown))
+    except ValueError:
+        return shown
+
+
+def empty(reason: str) -> Cell:
+    return Cell("–", reason or NO_VALUE)
+
+
+class Links:
+    """What made a value, below the results or further down on the page; empty where it is not there."""
+
+    def __init__(self, results: Path, pages: Iterable[Page] = ()):
+        self.results = results
+        self.anchors = {f"#{page.anchor}" for page in pages}
+
+    def __call__(self, path: str) -> str:
+        return path if path in self.anchors or path and (self.results / path).exists() else ""
+
+
+def csv_grid(spec: ReportTable, folder: Path, links: Links) -> Grid | None:
+    """Lines of a CSV file; None where it is not there."""
+    path = folder / f"{spec.table}.csv"
+    if not path.exists():
+        return None
+    lines = pd.read_csv(path, dtype=str, keep_default_na=False)
+    typed = pd.read_csv(path)
+    claims.require_columns(lines, [*spec.columns, *spec.empty], spec.table)
+    lines = lines.loc[claims.choose(typed, spec.where, spec.table).index]
+    columns = spec.columns or list(lines.columns)
+    rows = []
+    for line in lines.to_dict("records"):
+        href = links(spec.run.format(**line))
+        rows.append([_csv_cell(line[name], spec.empty.get(name, ""), href) for name in columns])
+    return Grid(spec.title, columns, rows)
+
+
+def _csv_cell(shown: str, reason: str, href: str) -> Cell:
+    if shown == "":
+        return empty(reason)
+    value = number(shown)
+    return Cell(value, href=href if value != shown or value.isdigit() else "")
+
+
+class Marks:
+    """How near measured values are to the paper's, by what they are of."""
+
+    def __init__(self, values: pd.DataFrame):
+        self.values = {tuple(line[key] for key in comparison.KEYS): line for line in values.to_dict("records")}
+
+    def __call__(self, *key: str) -> str:
+        mark = self.values.get(key, {}).get("mark", comparison.NO_MARK)
+        return "" if mark == comparison.NO_MARK else mark
+
+
+def stereo_grids(table: Table, folder: Path, links: Links, marks: Marks) -> list[Grid]:
+    """Tables I and II: blocks of fixed parameters, then of cross-validated ones."""
+    main = table.blocks[0].sweep.main_columns
+    wins = pd.read_csv(folder / f"{table.name}_wins.csv")
+    grids = []
+    for end, kind in (("", "fixed parameters"), ("_tuned", "cross-validated")):
+        frame = pd.read_csv(folder / f"{table.name}{end}.csv")
+        won = wins if end == "" else wins.iloc[:0]
+        for block in text.make_blocks(frame, won, table.quantities, main):
+            grids.append(_stereo_grid(table, block, kind, links, marks if end == "" else None))
+    return grids
+
+
+def _stereo_grid(table: Table, block: text.Block, kind: str, links: Links, marks: Marks | None) -> Grid:
+    matcher = {title: name for name, title in text.MATCHERS.items()}.get(block.matcher, block.matcher)
+    scenes = f"{block.scenes} scenes" if block.scenes else "published values only"
+    missing = "no pixel is matched" if block.scenes else f"{block.dataset} is not at hand"
+    rows = []
+    for row in block.rows:
+        scores = f"raw/{matcher}/{block.dataset}/{row.cost}"
+        href = links(f"{scores}.csv")
+        cells = [Cell(row.cost + (" (extra)" if row.extra else ""), href=links(f"{scores}.options.yaml"))]
+        for quantity, cell in zip(table.quantities, row.cells):
+            mark = marks(table.name, f"{matcher}, {block.region}", row.cost, quantity, quantity) if marks else ""
+            cells.append(_stereo_cell(cell, missing, href, mark))
+        rows.append([*cells, _won_cell(row, block, kind)])
+    title = f"{block.dataset}, {block.region}, {block.matcher}, {kind} ({scenes})"
+    head = ["cost", *(text.LABELS[quantity] for quantity in table.quantities), "scenes won"]
+    note = "In brackets: published. A cost links to its options, a value to the scores of its scenes."
+    return Grid(title, head, rows, note)
+
+
+def _stereo_cell(cell: text.Cell, missing: str, href: str, mark: str) -> Cell:
+    published = f" ({cell.published})" if cell.published else ""
+    if cell.measured:
+        return Cell(cell.measured + published, href=href, mark=mark, best=cell.best)
+    reason = missing if published else f"{missing}, and the paper has no value"
+    return Cell(f"–{published}", reason if missing != "no pixel is matched" else missing)
+
+
+def _won_cell(row: text.Row, block: text.Block, kind: str) -> Cell:
+    if row.won:
+        return Cell(row.won)
+    if row.extra:
+        return empty("only the paper's columns count")
+    return empty("counted for fixed parameters only" if block.scenes else f"{block.dataset} is not at hand")
+
+
+def joined_grids(joined: JoinedTable, folder: Path, links: Links, marks: Marks) -> list[Grid]:
+    """Table III, a block for each data set and condition."""
+    light = pd.read_csv(folder / f"{joined.name}_light.csv")
+    undisturbed = pd.read_csv(folder / f"{joined.name}.csv").assign(condition=joined_table.UNDISTURBED)
+    lines = pd.concat([undisturbed, light], ignore_index=True)
+    own = {system.name for system in joined_table.list_systems(joined, [])}
+    run = set(lines.loc[lines["runs"] > 0, "system"])
+    others = sorted(set(lines["system"]) - own | run & set(joined.published))
+    systems = joined_table.list_systems(joined, others)
+    return [_joined_grid(joined, block, links, marks) for block in joined_table.make_blocks(joined, systems, lines)]
+
+
+def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks) -> Grid:
+    labels = {"_".join(name.split("_")[:2]): (name, label) for name, label in joined_table.labels_of(joined).items()}
+    euroc = block["title"].startswith("euroc,")
+    heads = [*block["sequences"], "average", "success", "coverage %"]
+    rows = []
+    for row in block["rows"]:
+        published = row["label"].split("(")[-1].rstrip(")")
+        own = row["group"] in (joined_table.REBUILT, joined_table.BEYOND)
+        cells = [Cell(row["label"] + (f" [{row['group']}]" if row["group"] != joined_table.REBUILT else ""))]
+        for head, cell in zip(heads, row["cells"]):
+            name, label = labels.get(head, ("", "avg"))
+            mark = marks(joined.name, "", published, label, "ate_mean_m") if euroc and not cell.reason else ""
+            href = links(f"#{PAGES['sequence'].format(name)}") if own and not cell.reason else ""
+            cells.append(Cell(cell.shown, block["reasons"].get(cell.reason, ""), href, mark))
+        rows.append(cells)
+    note = (
+        "ATE in m, mean over frames and over the runs that succeed; how many do stands under success, and what fails is"
+        " infinite wherever methods are compared. In brackets: published."
+    )
+    return Grid(block["title"], ["system", *heads], rows, note)
+
+
+def _page(pages: dict[str, Page], kind: str, title: str, *key: str) -> Page:
+    """The page of that title, begun if there is none."""
+    return pages.setdefault(title, Page(PAGES[kind].format(*key), title))
+
+
+def scene_pages(tables: list[Table], folder: Path, links: Links) -> list[Page]:
+    """All scores at fixed parameters by scene."""
+    pages: dict[str, Page] = {}
+    for table in tables:
+        path = folder / f"{table.name}_scenes.csv"
+        if not path.exists():
+            continue
+        lines = pd.read_csv(path, dtype=str, keep_default_na=False)
+        for (dataset, scene), own in lines.groupby(["dataset", "scene"], sort=False):
+            page = _page(pages, "scene", f"{dataset}: {scene}", dataset, scene)
+            page.grids.append(_scene_grid(table, own.drop(columns=["dataset", "scene"]), dataset, links))
+    return list(pages.values())
+
+
+def _scene_grid(table: Table, lines: pd.DataFrame, dataset: str, links: Links) -> Grid:
+    rows = []
+    for line in lines.to_dict("records"):
+        href = links(f"raw/{line['matcher']}/{dataset}/{line['cost']}.csv")
+        rows.append([_csv_cell(shown, "no pixel is matched", href) for shown in line.values()])
+    return Grid(f"{table.title}: fixed parameters", list(lines.columns), rows)
+
+
+def sequence_pages(studies: dict[str, Callable[[str], str]], folder: Path, links: Links) -> list[Page]:
+    """All runs by sequence. @param studies what a sequence is called, by experiment."""
+    pages: dict[str, Page] = {}
+    for name, called in studies.items():
+        path = folder / f"{name}_runs.csv"
+        if not path.exists():
+            continue
+        lines = pd.read_csv(path, dtype=str, keep_default_na=False)
+        for sequence, own in lines.groupby("sequence", sort=False):
+            page = _page(pages, "sequence", called(sequence), called(sequence))
+            page.grids.append(_runs_grid(name, sequence, own.drop(columns="sequence"), links))
+    return list(pages.values())
+
+
+def _runs_grid(name: str, sequence: str, lines: pd.DataFrame, links: Links) -> Grid:
+    rows = []
+    for line in lines.to_dict("records"):
+        href = links(f"raw/{name}/{sequence}/run_{line['run']}/{line['condition']}/{line['column']}")
+        rows.append([_run_cell(column, shown, href) for column, shown in line.items()])
+    note = "∞: the run fails. A value links to its run."
+    return Grid(f"{name}: runs on {sequence}", list(lines.columns), rows, note)
+
+
+def _run_cell(column: str, shown: str, href: str) -> Cell:
+    if shown == "":
+        return empty("too few poses" if column != "compared" else "a lost run is not compared")
+    return _csv_cell(shown, "", href)
+
+
+def euroc_name(study: TrajectoryTable) -> Callable[[str], str]:
+    """What EuRoC calls a sequence of a table, so that all lines of it stand together."""
+    return lambda name: study.sequences[name].euroc_name
+
+
+def load_studies(names: list[str]) -> dict[str, Callable[[str], str]]:
+    """What experiments with repeated runs call their sequences."""
+    found = {}
+    for name in names:
+        study = config.load_experiment(name)
+        if study.kind in ("odometry", "trajectory_table"):
+            found[name] = euroc_name(study) if study.kind == "trajectory_table" else str
+    return found

@@ -1,0 +1,258 @@
+"""The report of a small tree of results: nothing empty without a reason, the same bytes for the same results."""
+
+import re
+import shutil
+from html.parser import HTMLParser
+
+import pandas as pd
+import pytest
+from PIL import Image
+
+from sgf_paper import claims, config, report, report_grid, style, summary, text
+from sgf_paper.config import ReportTable
+from sgf_paper.style import plt
+
+REPORT = config.load_experiment("report")
+MADE = ["table1", "table2", "fig1", "fig2_minima", "fig3", "table3", "table3_dso", "odometry", "density_equal"]
+STUB = "\\begin{longtable}{l}\nstub \\\\\n\\end{longtable}\n"
+
+
+@pytest.fixture
+def results(tmp_path):
+    """Tables of the reference run, which has no Table III of stereo-inertial odometry here, and empty figures."""
+    return make_results(tmp_path / "some results")
+
+
+def make_results(root):
+    tables, figures = root / "tables", root / "figures"
+    for folder in (tables, figures, root / "raw" / "stereo_bm" / "debian_pairs"):
+        folder.mkdir(parents=True)
+    for path in config.REFERENCE.glob("*.csv"):
+        if any(path.stem.startswith(name) for name in MADE) and not path.stem.startswith("table3_vio"):
+            shutil.copy(path, tables)
+    lines = pd.read_csv(tables / "table1_scenes.csv")
+    lines[lines["dataset"] == "debian_pairs"].to_csv(tables / "table1_scenes.csv", index=False)
+    for name in ("table1", "table2"):
+        header = "dataset,region,matcher,cost,quantity,won,scenes\n"
+        (tables / f"{name}_wins.csv").write_text(f"{header}debian_pairs,all,stereo_bm,sgf,mean_px,1,2\n")
+    for name in ("table1", "table2", "table3", "table3_dso"):
+        (tables / f"{name}.tex").write_text(STUB)
+    for name in ("fig1", "fig1_curves", "fig2", "fig3", "fig4"):
+        figure, axis = plt.subplots(figsize=(2, 2))
+        axis.plot([0, 1])
+        style.save(figure, figures, name)
+    (tables / "fig2.csv").write_text("row,metric,shift_px,error\n")
+    (root / "raw" / "stereo_bm" / "debian_pairs" / "sgf.csv").touch()
+    (root / "stages.tsv").write_text("mrpt_map\tthe MRPT module is not part of the build\n")
+    return root
+
+
+def make(results):
+    report.make_report("report", results, results / "stages.tsv", summary.main_file)
+    return (results / "report.html").read_text()
+
+
+@pytest.fixture
+def no_latex(monkeypatch):
+    monkeypatch.setattr(report.shutil, "which", lambda name: None)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A tree with its report, made once for the tests that only look at it: the folder and the page."""
+    root = make_results(tmp_path_factory.mktemp("report") / "some results")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report.shutil, "which", lambda name: None)
+        return root, make(root)
+
+
+@pytest.fixture
+def page(made):
+    return made[1]
+
+
+class Cells(HTMLParser):
+    """The text of all cells of tables, with what their title says, and all addresses."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.cells, self.addresses, self.anchors = [], [], set()
+        self._open = False
+        self.feed(page)
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.addresses += [attributes[key] for key in ("src", "href") if key in attributes]
+        self.anchors.add(attributes.get("id"))
+        if tag == "td":
+            self._open = True
+            self.cells.append(["", attributes.get("title", "")])
+
+    def handle_endtag(self, tag):
+        if tag == "td":
+            self._open = False
+
+    def handle_data(self, data):
+        if self._open:
+            self.cells[-1][0] += data
+
+
+def test_no_cell_is_empty_without_a_reason(page):
+    cells = Cells(page).cells
+    assert len(cells) > 5000
+    assert [cell for cell in cells if not cell[0].strip()] == []
+    dashes = [(shown, why) for shown, why in cells if re.match(r"^\s*(–|nan)", shown)]
+    assert len(dashes) > 100 and [cell for cell in dashes if len(cell[1]) < 5] == []
+
+
+def test_the_page_needs_no_other_file_and_no_network(page):
+    found = Cells(page)
+    assert "<link" not in page and "@import" not in page
+    images = [address for address in found.addresses if address.startswith("data:image/")]
+    assert len(images) == 5
+    for address in set(found.addresses) - set(images):
+        assert ":" not in address and not address.startswith("/"), address
+
+
+def test_links_lead_to_what_made_a_number_as_long_as_it_is_there(page):
+    found = Cells(page)
+    assert "raw/stereo_bm/debian_pairs/sgf.csv" in found.addresses
+    assert "raw/stereo_bm/debian_pairs/pm.csv" not in found.addresses
+    inside = {address[1:] for address in found.addresses if address.startswith("#")}
+    assert inside - found.anchors == set()
+    assert {"scene-debian_pairs-Aloe", "sequence-MH_01_easy"} <= inside
+
+
+def test_every_table_and_figure_of_the_paper_is_there_or_says_why_not(page):
+    for item in REPORT.items:
+        assert f'id="item-{item.name}"' in page
+    missing = dict(re.findall(r'id="item-(\w+)">(?:(?!</article>).)*?Not shown: ([^<]*)', page, re.DOTALL))
+    assert missing["mrpt_map"] == "the MRPT module is not part of the build."
+    assert missing["fig5"] == "it has not been run; ./reproduce.sh --only fig5 makes it."
+    assert not {"fig1", "fig4", "table1", "table3_dso"} & set(missing)
+    places = " ".join(item.place for item in REPORT.items)
+    assert all(f"Figure {number}" in places for number in range(1, 7))
+    assert all(f"Table {number}" in places for number in ("I", "II", "III"))
+
+
+def test_each_claim_has_a_verdict_and_the_number_that_says_so(made):
+    results, page = made
+    table = pd.read_csv(results / "tables" / "report_claims.csv")
+    own = table[(table["chapter"] == "claims") & (table["id"] == "table1_bm_mean")]
+    verdicts = own.drop_duplicates("source").set_index("source")["verdict"]
+    assert verdicts.to_dict() == {
+        "this run": "undecided", "reference run": "reproduced", "published rows": "holds",
+    }  # fmt: skip
+    assert "middlebury2014_q, sgf / orig: 0.52 [0.46, 0.60], 14 won, 1 lost, 0 tied of 15: better" in page
+    verdicts = pd.read_csv(results / "tables" / "report_verdicts.csv")
+    assert len(verdicts[verdicts["chapter"] == "claims"]) == len(config.load_claims().claims)
+    assert verdicts.notna().all().all()
+
+
+def test_only_the_papers_data_are_marked(made):
+    results, page = made
+    values = pd.read_csv(results / "tables" / "report_values.csv")
+    assert set(values["mark"]) == {"–"}
+    assert 'class="pass"' not in re.sub(r'<(?:b|td) class="pass">(?:reproduced|holds)', "", page)
+
+
+def test_measured_on_the_papers_data_a_value_has_its_mark_beside_it(results, no_latex):
+    scores = pd.read_csv(results / "tables" / "table1.csv")
+    half = scores["dataset"] == "middlebury2014_h"
+    scores.loc[half, "measured"] = scores.loc[half, "published"] * 1.01
+    scores.loc[half, "scenes"] = 15
+    scores.to_csv(results / "tables" / "table1.csv", index=False)
+    assert re.search(r'<td class="pass[^>]*>3\.32 \(3\.29\) <b>pass</b>', make(results))
+
+
+def test_failed_runs_are_shown(page):
+    runs = pd.read_csv(config.REFERENCE / "table3_dso_runs.csv")
+    assert runs["failed"].any()
+    shown = page[page.index('id="sequence-MH_01_easy"') :]
+    assert "∞" in shown
+    assert "failed 5 and 5" in page, "of pairs of runs those that fail are counted"
+
+
+def test_without_latex_only_the_pdf_is_left_out_and_that_is_said(results, no_latex):
+    (results / "report.pdf").write_text("of an earlier run")
+    page = make(results)
+    assert "report.pdf was not made: latexmk is not installed (packages.apt, section [report])" in page
+    assert not (results / "report.pdf").exists()
+
+
+def test_an_empty_tree_gives_a_report_that_says_so(tmp_path, no_latex):
+    page = make(tmp_path)
+    assert page.count("Not shown: it has not been run") == len(REPORT.items)
+    assert "No table with methods to compare was made." in page
+    assert "No scores of scenes or runs were made." in page
+
+
+def test_main_tex_has_each_item_of_the_paper_once():
+    document = report.MAIN.read_text()
+    for item in REPORT.items:
+        assert document.count(f"\\input{{item_{item.name}}}") == (1 if item.place else 0)
+
+
+@pytest.mark.skipif(not shutil.which("latexmk"), reason="latexmk is not installed")
+def test_page_and_document_repeat_to_the_byte(tmp_path):
+    one, two = make_results(tmp_path / "one"), make_results(tmp_path / "a longer name")
+    for results in (one, two):
+        make(results)
+    for name in ("report.html", "report.pdf"):
+        assert (one / name).read_bytes() == (two / name).read_bytes()
+    document = (one / "report.pdf").read_bytes()
+    assert document.startswith(b"%PDF") and b"CreationDate" not in document and str(tmp_path).encode() not in document
+    assert "Overfull" not in (one / "report" / "main.log").read_text()
+
+
+@pytest.mark.skipif(not shutil.which("latexmk"), reason="latexmk is not installed")
+def test_what_latex_does_not_take_is_an_error_that_names_the_log(results):
+    (results / "tables" / "table1.tex").write_text("\\nonsense\n")
+    with pytest.raises(report.ReportError, match=r"Undefined control sequence(?s:.*)main.log"):
+        make(results)
+    assert (results / "report.html").exists()
+
+
+def test_large_figures_are_compressed(tmp_path):
+    noise = Image.effect_noise((600, 600), 90)
+    noise.save(tmp_path / "large.png")
+    uri = report.data_uri(tmp_path / "large.png")
+    assert uri.startswith("data:image/webp;base64,") and len(uri) < (tmp_path / "large.png").stat().st_size
+
+
+def write_csv(folder, content):
+    (folder / "t.csv").write_text(content)
+    return folder
+
+
+def test_lines_of_a_table_have_reasons_links_and_few_digits(tmp_path):
+    folder = write_csv(tmp_path, "name,run,ms,ratio\na,1,12.3456,\nb,2,inf,1.0000\n")
+    (tmp_path / "raw" / "1").mkdir(parents=True)
+    spec = ReportTable("t", "T", ["name", "ms", "ratio"], empty={"ratio": "lost"}, run="raw/{run}")
+    grid = report_grid.csv_grid(spec, folder, report_grid.Links(tmp_path))
+    assert [[cell.shown for cell in row] for row in grid.rows] == [["a", "12.35", "–"], ["b", "∞", "1"]]
+    assert [cell.reason for cell in grid.rows[0]] == ["", "", "lost"] and grid.reasons == {"lost": "a"}
+    assert grid.rows[0][1].href == "raw/1" and grid.rows[1][1].href == ""
+
+
+def test_columns_that_a_table_lacks_are_named(tmp_path):
+    spec = ReportTable("t", "T", ["colour"])
+    with pytest.raises(claims.ClaimError, match="table t has no column colour"):
+        report_grid.csv_grid(spec, write_csv(tmp_path, "a\n1\n"), report_grid.Links(tmp_path))
+
+
+def test_reasons_beyond_z_have_two_letters():
+    rows = [[report_grid.empty(f"reason {index}")] for index in range(28)]
+    assert list(report_grid.Grid("T", ["a"], rows).reasons.values())[-3:] == ["z", "aa", "ab"]
+
+
+@pytest.mark.parametrize(
+    "prose, latex, html",
+    [
+        ("e_sgf3 of 5 %", r"$e_\mathrm{sgf3}$ of 5 \%", "<i>e</i><sub>sgf3</sub> of 5 %"),
+        ("`a_b` < ∞", r"\texttt{a\_b} $<$ $\infty$", "<code>a_b</code> &lt; ∞"),
+        (r"the_sum \x", r"the\_sum \textbackslash{}x", r"the_sum \x"),
+    ],
+)
+def test_prose_is_escaped_and_dissimilarities_are_symbols(prose, latex, html):
+    assert (text._latex_prose(prose), str(text._html_prose(prose))) == (latex, html)
