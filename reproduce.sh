@@ -33,6 +33,8 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --runs N        runs of each line of the tables that repeat runs (odometry, table3);
                   default: a few, for a quick look; rankings take 10, shares of success 25
   --jobs N        parallel jobs; default: the number of processors
+  --cluster slurm build here, and submit each job to Slurm (docs/scaling.md), --jobs of them at a time,
+                  200 by default; project and data have to lie in folders that all nodes share
   --verify        run a sample of what was made again, one of each kind and about ten minutes in all, and
                   compare: bit for bit on the same machine with the same packages and code, else within
                   paper/tolerances.yaml; exit code 1 if anything differs or nothing was made
@@ -222,8 +224,8 @@ run_experiments() {
     printf '  the MRPT module and what it shows are left out; why: %s\n' "$logs/configure.log"
   build release sgf_align sgf_direct sgf_eval sgf_render sgf_stereo sgf_study sgf_vio stereo_bench "${mrpt[@]}"
   cd paper
-  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$jobs" "${full[@]}" "${runs[@]}" \
-    "${stages[@]}"
+  exec "$python" -m sgf_paper.run --bin "$bin" --data "$data" --jobs "$at_once" "${cluster[@]}" "${full[@]}" \
+    "${runs[@]}" "${stages[@]}"
 }
 
 run_tests() {
@@ -251,7 +253,8 @@ full=()
 accepted=()
 runs=()
 data=${SGF_DATA:-}
-jobs=$(nproc)
+jobs=
+cluster=()
 
 while (($#)); do
   case $1 in
@@ -280,6 +283,11 @@ while (($#)); do
     --jobs)
       require_number "$@"
       jobs=$2
+      shift
+      ;;
+    --cluster)
+      [[ ${2:-} == slurm ]] || wrong_usage "--cluster needs the kind of cluster: slurm"
+      cluster=(--cluster slurm)
       shift
       ;;
     --list | --clean | --verify) mode=${1#--} ;;
@@ -311,6 +319,9 @@ if [[ -n $data ]]; then
   data=$(realpath -- "$data")
   cd -- "$project"
 fi
+at_once=${jobs:-200} # of a cluster
+jobs=${jobs:-$(nproc)}
+((${#cluster[@]})) || at_once=$jobs
 ((${#stages[@]})) || mapfile -t stages < <(default_names)
 
 case $mode in

@@ -7,6 +7,7 @@ names its log. Exit code 0 if every stage that has data was made, 130 if interru
 from __future__ import annotations
 
 import argparse
+import contextlib
 import fcntl
 import os
 import signal
@@ -17,12 +18,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from sgf_paper import config, summary
+from sgf_paper import cluster, config, summary
 from sgf_paper.config import Dataset, Experiment
 from sgf_paper.progress import clock
 
-PYTHON = "/usr/bin/python3"  # Debian's, which has Snakemake; another may stand first on the PATH
-
+PYTHON = cluster.PYTHON
+MARK = "SGF_RESULTS"  # in the environment of all that a run starts: the folder it works for
+DEFAULT_RESOURCES = {"mem_mb": 2000, "runtime": 120}  # of a job; minutes; the Snakefile has the others
+LOCK_S = 5  # for what a killed run has started to end
 
 class RunError(Exception):
     """Why a run cannot go on."""
@@ -36,9 +39,10 @@ class Settings:
     results: Path
     data: str  # empty: no downloaded data sets
     generated: Path
-    jobs: int
+    jobs: int  # on a cluster: submitted at a time
     full: bool  # the full suites of rendered sequences
     runs: int  # of experiments that repeat runs; 0 for as many as they say
+    on_cluster: bool = False  # a Slurm job for each of Snakemake's
 
     @property
     def logs(self) -> Path:
@@ -51,11 +55,45 @@ def lock(results: Path) -> int:
     @returns the open file that holds the lock; the kernel drops it when the last holder ends.
     """
     descriptor = os.open(results / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        raise RunError(f"another run is at work in {results}") from error
-    return descriptor
+    deadline = time.monotonic() + LOCK_S
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return descriptor
+        except OSError as error:
+            if time.monotonic() > deadline:
+                raise RunError(f"another run is at work in {results}") from error
+        time.sleep(0.1)
+
+
+def _leftovers(results: Path) -> list[int]:
+    """Processes that a run in this folder has started, by their environment; its own children are not asked."""
+    mark, found = f"{MARK}={results}".encode(), []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark in (process / "environ").read_bytes().split(b"\0"):
+                found.append(int(process.name))
+        except OSError:
+            continue  # another user's, or gone
+    return [process for process in found if process != os.getpid()]
+
+
+def end_leftovers(settings: Settings) -> None:
+    """Ends jobs of a run that was killed, which would write what is about to be made.
+
+    To be called with the lock held, before anything is started.
+    @throws RunError if they do not end.
+    """
+    deadline = time.monotonic() + cluster.END_S
+    while left := _leftovers(settings.results):
+        if time.monotonic() > deadline:
+            raise RunError(f"processes of an earlier run do not end: {left}")
+        for process in left:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+        time.sleep(0.1)
+    if settings.on_cluster:
+        cluster.end_leftovers(settings.results)
 
 
 def make_debian_pairs(settings: Settings) -> None:
@@ -105,6 +143,14 @@ def obstacle(stage: Experiment, datasets: dict[str, Dataset], programs: Path) ->
     return "" if has_data(stage, datasets) else "its data are not at hand"
 
 
+def _where(settings: Settings) -> list[str]:
+    """What tells Snakemake where to run jobs, and how many at a time."""
+    if settings.on_cluster:
+        return cluster.snakemake_flags(settings.results, settings.jobs)
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") >> 20
+    return ["--cores", str(settings.jobs), "--resources", f"mem_mb={memory}"]
+
+
 def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str]:
     values = {
         "stages": " ".join(stage.name for stage in stages),
@@ -113,12 +159,15 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
         "generated": settings.generated,
         "full": int(settings.full),
         "runs": settings.runs,
+        "cores": cluster.node_cores() if settings.on_cluster else settings.jobs,
     }
     return [
+        "setpriv", "--pdeathsig", "KILL",  # it ends with this program, however that ends
         PYTHON, "-m", "snakemake",
         "--snakefile", str(config.PAPER / "Snakefile"),
         "--directory", str(settings.results),
-        "--cores", str(settings.jobs),
+        *_where(settings),
+        "--default-resources", *(f"{name}={value}" for name, value in DEFAULT_RESOURCES.items()),
         "--scheduler", "greedy",
         "--nolock",  # lock() does it, without stale locks after a crash
         "--rerun-incomplete",
@@ -135,7 +184,7 @@ def environment(results: Path) -> dict[str, str]:
     """
     cache = results / ".cache"
     folders = {"XDG_CACHE_HOME": str(cache), "MPLCONFIGDIR": str(cache / "matplotlib")}
-    return {"SOURCE_DATE_EPOCH": "0", **os.environ, **folders}
+    return {"SOURCE_DATE_EPOCH": "0", **os.environ, **folders, MARK: str(results)}
 
 
 def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int, log_name: str = "snakemake") -> bool:
@@ -162,6 +211,7 @@ def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
     started = time.time()
     settings.logs.mkdir(parents=True, exist_ok=True)
     lock_file = lock(settings.results)
+    end_leftovers(settings)
     print("== data sets", flush=True)
     make_debian_pairs(settings)
     datasets = find_datasets(settings)
@@ -233,6 +283,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--generated", type=Path, default=config.PROJECT / "datasets" / "generated")
     parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
+    parser.add_argument("--cluster", choices=["slurm"], help="submit each job; --jobs at a time")
     parser.add_argument("--full", action="store_true", help="full suites of sequences, not short ones")
     parser.add_argument("--runs", type=int, default=0, help="of experiments that repeat runs")
     parser.add_argument("stages", nargs="+", help="names of experiments")
@@ -254,11 +305,12 @@ def main() -> int:
         jobs=arguments.jobs,
         full=arguments.full,
         runs=arguments.runs,
+        on_cluster=arguments.cluster is not None,
     )
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]
         return 0 if make_stages(settings, stages) else 1
-    except (RunError, config.ConfigError) as error:
+    except (RunError, cluster.ClusterError, config.ConfigError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
