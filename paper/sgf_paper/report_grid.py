@@ -55,14 +55,12 @@ def _letters(index: int) -> str:
     return (_letters(index // 26 - 1) if index >= 26 else "") + chr(ord("a") + index % 26)
 
 
-def number(shown: str) -> str:
-    """A number of a CSV file with four significant digits; other text as it is."""
-    if "." not in shown and shown != "inf":
-        return shown
+def as_number(shown: str) -> float | None:
+    """What a text of a CSV file says, if that is a number."""
     try:
-        return claims.shown(float(shown))
+        return float(shown)
     except ValueError:
-        return shown
+        return None
 
 
 def empty(reason: str) -> Cell:
@@ -98,10 +96,14 @@ def csv_grid(spec: ReportTable, folder: Path, links: Links) -> Grid | None:
 
 
 def _csv_cell(shown: str, reason: str, href: str) -> Cell:
+    """A value of a CSV file; a number has four significant digits and a link to what made it."""
     if shown == "":
         return empty(reason)
-    value = number(shown)
-    return Cell(value, href=href if value != shown or value.isdigit() else "")
+    value = as_number(shown)
+    if value is None:
+        return Cell(shown)
+    whole = "." not in shown and shown != "inf"
+    return Cell(shown if whole else claims.shown(value), href=href)
 
 
 class Marks:

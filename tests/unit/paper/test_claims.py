@@ -127,6 +127,15 @@ def test_pairs_that_fail_twice_say_nothing_and_are_counted():
     assert states(RUNS, runs([math.inf] * 12, [math.inf] * 12)) == [FEW]
 
 
+def test_failures_and_lines_without_partner_are_in_the_table_of_pairs():
+    spec = ReportPairs(
+        "odometry", "t", "T", "column", "ate", ["sequence"], ["sequence", "run"], {"runs": ["sequence", "first_frame"]}
+    )  # fmt: skip
+    line = pairs.make_table(spec, runs([0.5, math.inf, math.inf, 2.0], [1.0, math.inf, 1.0]), RULE).iloc[0]
+    counts = ["pairs", "own_failed", "other_failed", "both_failed", "unpaired", "won", "lost", "tied"]
+    assert list(line[counts]) == [3, 2, 1, 1, 1, 1, 1, 0]
+
+
 def test_runs_of_few_first_frames_are_few_pairs():
     frame = runs([0.5] * 20, [1.0] * 20)
     frame["first_frame"] %= 5
