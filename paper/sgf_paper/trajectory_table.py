@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -31,6 +32,7 @@ COMPARED_ERRORS = [
     "sequence", "condition", "column", "baseline", "pairs", "both_failed", "ratio", "ratio_low", "ratio_high",
     "verdict",
 ]  # fmt: skip
+LEGEND_COLUMNS = 6
 NAN = float("nan")
 
 
@@ -164,16 +166,19 @@ def draw(study: TrajectoryTable, runs: pd.DataFrame) -> plt.Figure:
     extra = [column for column in study.columns if column not in style.COLOURS]
     styles = {column: style.line_style(column, extra) for column in study.columns}
     conditions = list(runs["condition"].unique())
-    drawing, axes = plt.subplots(1, len(conditions), figsize=(1 + 3.6 * len(conditions), 3.4), squeeze=False)
+    below, width = 0.1 + 0.17 * math.ceil(len(styles) / LEGEND_COLUMNS), 1 + 3.6 * len(conditions)  # inches
+    height = 3.1 + below
+    drawing, axes = plt.subplots(1, len(conditions), figsize=(width, height), squeeze=False)
     for axis, condition in zip(axes[0], conditions):
         own = runs[runs["condition"] == condition]
         draw_curves(axis, own, limits, "column", styles)
         counts = own["sequence"].nunique(), len(own.drop_duplicates(["sequence", "run"]))
         axis.set_title("{} (sequences: {}, runs of each column: {})".format(condition, *counts))
     axes[0, 0].set_ylabel("runs with a smaller error, %")
-    drawing.legend(*axes[0, 0].get_legend_handles_labels(), loc="lower center", ncol=6, frameon=False)
+    lines = axes[0, 0].get_legend_handles_labels()
+    drawing.legend(*lines, loc="lower center", ncol=LEGEND_COLUMNS, frameon=False)
     drawing.suptitle(f"{study.title}\nruns that fail reach no error")
-    drawing.tight_layout(rect=(0, 0.07, 1, 1))
+    drawing.tight_layout(rect=(0, below / height, 1, 1))
     return drawing
 
 
