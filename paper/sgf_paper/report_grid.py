@@ -48,6 +48,7 @@ class Page:
     anchor: str
     title: str
     grids: list[Grid] = field(default_factory=list)
+    aliases: list[str] = field(default_factory=list)  # further anchors: what experiments call the sequence
 
 
 def _letters(index: int) -> str:
@@ -72,7 +73,7 @@ class Links:
 
     def __init__(self, results: Path, pages: Iterable[Page] = ()):
         self.results = results
-        self.anchors = {f"#{page.anchor}" for page in pages}
+        self.anchors = {f"#{anchor}" for page in pages for anchor in (page.anchor, *page.aliases)}
 
     def __call__(self, path: str) -> str:
         return path if path in self.anchors or path and (self.results / path).exists() else ""
@@ -236,6 +237,9 @@ def sequence_pages(studies: dict[str, Callable[[str], str]], folder: Path, links
         lines = pd.read_csv(path, dtype=str, keep_default_na=False)
         for sequence, own in lines.groupby("sequence", sort=False):
             page = _page(pages, "sequence", called(sequence), called(sequence))
+            alias = PAGES["sequence"].format(sequence)
+            if alias not in (page.anchor, *page.aliases):
+                page.aliases.append(alias)
             page.grids.append(_runs_grid(name, sequence, own.drop(columns="sequence"), links))
     return list(pages.values())
 
