@@ -113,14 +113,13 @@ def test_a_job_that_fails_on_the_cluster_names_its_log(project, slurm):
 def test_without_a_cluster_it_says_so(project):
     (project.root / "slurm.conf").touch()
     code, output = project.run("--cluster", "slurm", "--only", "fig2", SLURM_CONF=str(project.root / "slurm.conf"))
-    assert code == 1 and "Error: scancel" in output
+    assert code == 1 and ("slurm.conf" in output or "is not installed" in output)
 
 
 def end(process, whole_group):
-    """Kills reproduce.sh alone, or with all that it has started."""
+    """Kills reproduce.sh alone, or with all that it has started; what is left can go on printing."""
     (os.killpg if whole_group else os.kill)(process.pid, signal.SIGKILL)
     process.wait(timeout=60)
-    process.stdout.close()
 
 
 @pytest.mark.parametrize("moment", range(MOMENTS))
@@ -133,6 +132,7 @@ def test_killed_at_a_random_moment_it_makes_the_same_when_started_again(moment, 
     except subprocess.TimeoutExpired:
         end(process, whole_group=moment % 2 == 0)
     code, output = project.run("--only", *STAGES)
+    process.stdout.close()
     assert code == 0, output
     assert made(project) == wanted
     assert {run["exit"]["state"] for run in recorded(project).values()} == {"done"}
