@@ -52,12 +52,17 @@ def node_cores() -> int:
 
 
 def snakemake_flags(results: Path, jobs: int) -> list[str]:
-    """What tells Snakemake to submit a job for each of its own. @param jobs submitted at a time."""
+    """What tells Snakemake to submit a job for each of its own. @param jobs submitted at a time.
+
+    Makes the folder for what jobs print; Slurm does not.
+    """
+    logs = results / "logs" / "slurm"
+    logs.mkdir(parents=True, exist_ok=True)
     submit = [
         "sbatch --parsable",
         f"--job-name={job_name(results)}",
         "--cpus-per-task={threads} --mem={resources.mem_mb} --time={resources.runtime}",
-        "--output=logs/slurm/%j.log",
+        f"--output='{logs}/%j.log'",
     ]
     return [
         "--jobs", str(jobs),

@@ -136,10 +136,11 @@ def _distribution(span: SearchRange) -> BaseDistribution:
 
 
 def rounded(tuning: TrackingTuning, options: Options) -> Options:
-    """The options with as many digits as are tried."""
+    """The options with as many digits as are tried, in the order of the space: a database has its own."""
     return {
-        name: int(value) if tuning.space[name].integer else float(f"{value:.{DIGITS}g}")
-        for name, value in options.items()
+        name: int(options[name]) if span.integer else float(f"{options[name]:.{DIGITS}g}")
+        for name, span in tuning.space.items()
+        if name in options
     }
 
 

@@ -57,6 +57,8 @@ def test_help_and_list_need_nothing_built(project):
         (["--jobs"], "--jobs needs"),
         (["--runs", "0"], "--runs needs a positive number, not '0'"),
         (["--runs"], "--runs needs"),
+        (["--cluster"], "--cluster needs the kind of cluster: slurm"),
+        (["--cluster", "sge"], "--cluster needs the kind of cluster: slurm"),
         (["--data"], "--data needs a folder"),
         (["--data", "/nonexistent/data"], "data folder '/nonexistent/data' does not exist"),
         (["test", "--only", "table1"], "does not go with test"),

@@ -374,6 +374,13 @@ def test_bad_sweeps_are_named(sweep, tmp_path):
     assert not (tmp_path / "raw.csv").exists()
 
 
+def test_the_build_is_told_with_its_instruction_set():
+    result = run("sgf_eval", "build")
+    told = dict(line.split(": ", 1) for line in result.stdout.splitlines())
+    assert result.returncode == 0 and list(told) == ["version", "revision", "compiler", "type", "simd"]
+    assert told["simd"] and told["compiler"].split()[0] in ("GNU", "Clang")
+
+
 def test_a_change_is_made_to_the_right_images(sweep, tmp_path):
     changes = tmp_path / "changes.yaml"
     changes.write_text("changes:\n  dark: {exposure: 0.001}\n")

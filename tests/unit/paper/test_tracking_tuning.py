@@ -214,6 +214,14 @@ def test_a_stopped_search_finds_what_it_would_have_found(tracker, tmp_path, stop
     assert len(tried) == 12, "all trials are done"
 
 
+def test_options_are_in_the_order_of_the_space_whatever_the_database_has(tuning):
+    tried = dict(sorted(DEFAULTS.items(), reverse=True))
+    for options in (tried, dict(reversed(tried.items()))):
+        assert list(tracking_tuning.rounded(tuning, options).items()) == [
+            (name, DEFAULTS[name]) for name in tuning.space if name in DEFAULTS
+        ]
+
+
 def test_another_program_or_other_data_begin_anew(tracker, tmp_path):
     names = [tracking_tuning.study_name(tracker, 0)]
     for file in (tracker.program, tracker.scorer, tmp_path / "suite" / "MH_01_easy" / "manifest.yaml"):
