@@ -16,13 +16,13 @@
 #include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
-#include <ImfVersion.h>
 #include <fmt/format.h>
 #include <half.h>
 
 #include <sgf/core/error.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/exr.h>
+#include <sgf/io/exr_check.h>
 #include <sgf/io/fields.h>
 #include <sgf/io/read_file.h>
 
@@ -242,49 +242,6 @@ std::string Encode(const ExrImage& image, const std::string& where) {
 
 // ---- Reading
 
-// Takes a number of bytes off the front of `rest`.
-std::string_view Take(std::string_view& rest, size_t count, const std::string& where) {
-  if (rest.size() < count) throw Error(where, "truncated OpenEXR header");
-  const std::string_view taken = rest.substr(0, count);
-  rest.remove_prefix(count);
-  return taken;
-}
-
-uint32_t TakeUint32(std::string_view& rest, const std::string& where) {
-  uint32_t value = 0;
-  for (int shift = 0; const char byte : Take(rest, 4, where)) {
-    value |= uint32_t{static_cast<unsigned char>(byte)} << shift;
-    shift += 8;
-  }
-  return value;
-}
-
-std::string_view TakeName(std::string_view& rest, const std::string& where) {
-  const std::string_view name = Take(rest, std::min(rest.find('\0'), rest.size()), where);
-  Take(rest, 1, where);
-  return name;
-}
-
-void RequireScanLines(uint32_t version, const std::string& where) {
-  const auto flags = static_cast<int>(version);
-  if (Imf::isMultiPart(flags)) throw Error(where, "has several parts; one is needed");
-  if (Imf::isNonImage(flags)) throw Error(where, "is a deep image");
-  if (Imf::isTiled(flags)) throw Error(where, "is tiled; scan lines are needed");
-}
-
-// Checks the kind of file, and that all attributes end within it, since the library allocates
-// memory of any size that an attribute claims to have. Layout: "OpenEXR File Layout", openexr.com.
-void RequireSoundHeader(std::string_view bytes, const std::string& where) {
-  if (!Imf::isImfMagic(std::string(bytes).append(4, '\0').c_str()))
-    throw Error(where, "is no OpenEXR file");
-  bytes.remove_prefix(4);
-  RequireScanLines(TakeUint32(bytes, where), where);
-  while (!TakeName(bytes, where).empty()) {
-    TakeName(bytes, where);  // the type
-    Take(bytes, TakeUint32(bytes, where), where);
-  }
-}
-
 // Sides of a window, whose corners can be any numbers in a damaged file.
 cv::Size WindowSize(const Imath::Box2i& window) {
   const auto side = [](int64_t min, int64_t max) {
@@ -391,18 +348,17 @@ std::optional<SE3> TakePose(ExrImage& image, const std::string& where) {
   return pose;
 }
 
-Imf::Header ReadHeader(std::string_view bytes, MemoryReader& reader, const std::string& where) {
-  std::string_view rest = bytes.substr(4);
-  auto version = static_cast<int>(TakeUint32(rest, where));
+Imf::Header ReadHeader(MemoryReader& reader, int version) {
+  constexpr uint64_t kBehindVersion = 8;
   Imf::Header header;
-  reader.seekg(8);
+  reader.seekg(kBehindVersion);
   header.readFrom(reader, version);
   return header;
 }
 
-ExrImage Decode(std::string_view bytes, const std::string& where) {
+ExrImage Decode(std::string_view bytes, int version, const std::string& where) {
   MemoryReader reader(bytes);
-  const Imf::Header header = ReadHeader(bytes, reader, where);
+  const Imf::Header header = ReadHeader(reader, version);
   ExrImage image = MakeImage(header, bytes.size(), where);
   reader.seekg(0);
   Imf::InputFile file(reader, kNoThreads);
@@ -434,8 +390,8 @@ void WriteExr(const std::filesystem::path& path, const ExrImage& image) {
 ExrImage ReadExr(const std::filesystem::path& path) {
   const std::string where = path.string();
   const std::string bytes = ReadFile(path);
-  RequireSoundHeader(bytes, where);
-  ExrImage image = WithOpenExr(where, [&] { return Decode(bytes, where); });
+  const int version = RequireSoundExrHeader(bytes, where);
+  ExrImage image = WithOpenExr(where, [&] { return Decode(bytes, version, where); });
   image.camera = TakeCamera(image, where);
   image.T_world_cam = TakePose(image, where);
   image.attributes.erase(kPose);

@@ -1,10 +1,15 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
-#include <system_error>
+
+#include <signal.h>
+#include <stdlib.h>
+#include <sys/time.h>
 
 #include <sgf/core/error.h>
 
@@ -13,7 +18,7 @@
 /// What libFuzzer calls with every input, and a test with every file of the corpus
 /// (replay_test.cc). A fuzzer is one file that defines it: it hands the bytes to the loaders of a
 /// kind of file. Whatever they are, a loader gives a result or an sgf::Error. Another exception, a
-/// report of a sanitizer, gigabytes or seconds are findings.
+/// report of a sanitizer, gigabytes and ten seconds of the processor are findings.
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace sgf {
@@ -22,9 +27,29 @@ inline std::string_view InputText(const uint8_t* data, size_t size) {
   return {reinterpret_cast<const char*>(data), size};
 }
 
+/// While it lives, this much processor time of the process ends it: that of a hang, and not of a
+/// busy machine, which lets libFuzzer's own timeout, by the clock, go off anywhere.
+class ProcessorTimeLimit {
+ public:
+  explicit ProcessorTimeLimit(int seconds) {
+    signal(SIGPROF, [](int) { abort(); });
+    Set(seconds);
+  }
+  ~ProcessorTimeLimit() { Set(0); }
+  ProcessorTimeLimit(const ProcessorTimeLimit&) = delete;
+  ProcessorTimeLimit& operator=(const ProcessorTimeLimit&) = delete;
+
+ private:
+  static void Set(int seconds) {
+    const itimerval once{{0, 0}, {seconds, 0}};
+    setitimer(ITIMER_PROF, &once, nullptr);
+  }
+};
+
 /// Calls a loader, which may refuse what it is given. @return whether it did not.
 template <class F>
 bool Loads(F&& load) {
+  const ProcessorTimeLimit limit(10);
   try {
     load();
   } catch (const Error&) {

@@ -1,3 +1,5 @@
+#include <vector>
+
 #include <sgf/io/stereo_dataset.h>
 
 #include "fuzz/fuzz_input.h"
@@ -5,10 +7,9 @@
 namespace {
 
 void LoadAs(sgf::StereoLayout layout, const std::filesystem::path& folder) {
-  sgf::Loads([&] {
-    for (const sgf::StereoScene& scene : sgf::ListStereoScenes(folder, layout))
-      sgf::Loads([&] { sgf::LoadStereoScene(scene); });
-  });
+  std::vector<sgf::StereoScene> scenes;
+  sgf::Loads([&] { scenes = sgf::ListStereoScenes(folder, layout); });
+  for (const sgf::StereoScene& scene : scenes) sgf::Loads([&] { sgf::LoadStereoScene(scene); });
 }
 
 }  // namespace

@@ -29,13 +29,13 @@ def test_reports_executions_and_coverage(tmp_path):
     ended = run(tmp_path, GOOD, "--seconds", "7", "exr", "image")
     assert ended.returncode == 0, ended.stderr
     assert [line.split() for line in ended.stdout.splitlines()[1:]] == [
-        [name, "789", "34", "56", "no", "finding"] for name in ("exr", "image")]
+        [name, "789", "0", "34", "56", "no", "finding"] for name in ("exr", "image")]
 
 
 def test_limits_time_and_memory_and_starts_from_the_committed_corpus(tmp_path):
     run(tmp_path, GOOD, "--seconds", "7", "exr")
     arguments = (tmp_path / "exr.arguments").read_text().split()
-    assert {"-rss_limit_mb=2048", "-timeout=10", "-max_total_time=7"} <= set(arguments)
+    assert {"-rss_limit_mb=2048", "-timeout=300", "-max_total_time=7"} <= set(arguments)
     assert arguments[-2:] == [str(tmp_path / "out/corpus/exr"), str(RUN.parent / "corpus/exr")]
     assert not (tmp_path / "image.arguments").exists()
 

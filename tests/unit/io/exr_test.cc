@@ -36,6 +36,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
@@ -283,6 +284,42 @@ TEST(Exr, GivesAnImageOrAnErrorForChangedBytes) {
     ++errors;
   }
   EXPECT_GT(errors, 1000);
+}
+
+// The error for a file whose header begins with an attribute of this type and content.
+std::string ErrorWithAttribute(const std::string& type, const std::string& data) {
+  const TempDir dir;
+  WriteExr(dir.File("whole.exr"), Rendered());
+  std::string bytes = ReadFile(dir.File("whole.exr"));
+  std::string size(4, '\0');
+  size[0] = static_cast<char>(data.size());
+  bytes.insert(8, std::string("a\0", 2) + type + '\0' + size + data);
+  return ReadError(dir.Write("a.exr", bytes));
+}
+
+// The library would take what follows for another attribute and allocate what that claims to have.
+TEST(Exr, ReportsAttributesWithoutTheSizeOfTheirType) {
+  const std::string channel = std::string("R\0", 2) + std::string(16, '\1');
+  const std::string pixels(12, '\1');  // 16843009x16843009
+  for (const auto& [type, data] : {std::pair<std::string, std::string>{"int", "123"},
+                                   {"box2i", "1234"},
+                                   {"floatvector", "12345"},
+                                   {"chlist", channel + std::string("\0x", 2)},
+                                   {"preview", pixels}})
+    EXPECT_THAT(ErrorWithAttribute(type, data), HasSubstr("damaged header")) << type;
+  EXPECT_THAT(ErrorWithAttribute("stringvector", "\xff\xff\xff\x7f"), HasSubstr("truncated"));
+  EXPECT_THAT(ErrorWithAttribute("chlist", channel), HasSubstr("truncated"));
+}
+
+TEST(Exr, TakesAttributesOfAllKinds) {
+  const std::string one("\1\0\0\0", 4);
+  for (const auto& [type, data] : {std::pair<std::string, std::string>{"int", "1234"},
+                                   {"floatvector", "12345678"},
+                                   {"chlist", std::string("R\0", 2) + std::string(16, '\1') + '\0'},
+                                   {"stringvector", one + "a" + one + "b"},
+                                   {"preview", one + one + "rgba"},
+                                   {"somebody's", "12345"}})
+    EXPECT_THAT(ErrorWithAttribute(type, data), Not(HasSubstr("header"))) << type;
 }
 
 Imf::Header PlainHeader(int width = 8, int height = 8) {
