@@ -7,12 +7,9 @@ asks anything. Exit code 0: all named data sets are there; 1: one is not, and wh
 from __future__ import annotations
 
 import argparse
-import fcntl
 import hashlib
-import os
 import shutil
 import sys
-import time
 from dataclasses import asdict, dataclass, field
 from datetime import date
 from functools import partial
@@ -22,7 +19,7 @@ from typing import Any
 import yaml
 
 from sgf_paper import catalog as catalogs
-from sgf_paper import config, download, unpack
+from sgf_paper import config, download, file_lock, unpack
 from sgf_paper.catalog import Archive, Catalog, Piece, Source
 from sgf_paper.config import ConfigError
 from sgf_paper.download import DownloadError, Patience
@@ -278,16 +275,10 @@ def take(folder: Path) -> int:
     """Takes a folder for this process; the open file that holds it."""
     work = folder / ".sgf-fetch"
     work.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(work / "lock", os.O_RDWR | os.O_CREAT, 0o644)
-    deadline = time.monotonic() + LOCK_WAIT_S
-    while True:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return descriptor
-        except OSError as error:
-            if time.monotonic() > deadline:
-                raise FetchError(f"another fetch is at work in {folder}") from error
-            time.sleep(0.1)
+    descriptor = file_lock.take(work / "lock", LOCK_WAIT_S)
+    if descriptor is None:
+        raise FetchError(f"another fetch is at work in {folder}")
+    return descriptor
 
 
 def hand_line(source: Source, fetcher: Fetcher) -> str:

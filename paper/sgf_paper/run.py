@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import fcntl
 import os
 import signal
 import subprocess
@@ -18,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from sgf_paper import cluster, config, summary
+from sgf_paper import cluster, config, file_lock, summary
 from sgf_paper.config import Dataset, Experiment
 from sgf_paper.progress import clock
 
@@ -26,6 +25,7 @@ PYTHON = cluster.PYTHON
 MARK = "SGF_RESULTS"  # in the environment of all that a run starts: the folder it works for
 DEFAULT_RESOURCES = {"mem_mb": 2000, "runtime": 120}  # of a job; minutes; the Snakefile has the others
 LOCK_S = 5  # for what a killed run has started to end
+
 
 class RunError(Exception):
     """Why a run cannot go on."""
@@ -50,20 +50,11 @@ class Settings:
 
 
 def lock(results: Path) -> int:
-    """Takes the results folder for this process and those it starts.
-
-    @returns the open file that holds the lock; the kernel drops it when the last holder ends.
-    """
-    descriptor = os.open(results / ".lock", os.O_RDWR | os.O_CREAT, 0o644)
-    deadline = time.monotonic() + LOCK_S
-    while True:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return descriptor
-        except OSError as error:
-            if time.monotonic() > deadline:
-                raise RunError(f"another run is at work in {results}") from error
-        time.sleep(0.1)
+    """Takes the results folder for this process and those it starts; the open file that holds it."""
+    descriptor = file_lock.take(results / ".lock", LOCK_S)
+    if descriptor is None:
+        raise RunError(f"another run is at work in {results}")
+    return descriptor
 
 
 def _leftovers(results: Path) -> list[int]:

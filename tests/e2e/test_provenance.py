@@ -88,6 +88,7 @@ def queue(environment):
     return subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True).stdout.split()
 
 
+@pytest.mark.xdist_group("slurm")  # one cluster at a time
 def test_slurm_makes_the_same_tables_and_goes_on_after_a_kill(project, tmp_path, slurm, kill):
     stages = ["fig2", "table3_vio"]
     assert project.run("--only", *stages)[0] == 0
@@ -102,6 +103,7 @@ def test_slurm_makes_the_same_tables_and_goes_on_after_a_kill(project, tmp_path,
     assert sorted(recorded(other)) == sorted(recorded(project)) and not queue(slurm)
 
 
+@pytest.mark.xdist_group("slurm")  # one cluster at a time
 def test_a_job_that_fails_on_the_cluster_names_its_log(project, slurm):
     project.fail("pair")
     code, output = project.run("--cluster", "slurm", "--only", "scenes", **slurm)
