@@ -115,9 +115,9 @@ class Project:
         }
 
     def start(self, *arguments, **environment):
-        """Starts reproduce.sh as the leader of its own process group."""
+        """Starts reproduce.sh as the leader of its own process group; SIGINT is heard even where these tests were told not to."""
         return subprocess.Popen(
-            [self.root / "reproduce.sh", *arguments],
+            ["/usr/bin/env", "--default-signal=INT", self.root / "reproduce.sh", *arguments],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL,
