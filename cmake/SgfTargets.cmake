@@ -86,6 +86,7 @@ function(sgf_library name)
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/"
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sgf/${name}
     FILES_MATCHING PATTERN "*.h" PATTERN "*.inc")
+  set_property(GLOBAL APPEND PROPERTY SGF_PUBLIC_FOLDERS "${CMAKE_CURRENT_SOURCE_DIR}")
 endfunction()
 
 # sgf_app(NAME SOURCES file... [DEPENDS target...]) makes and installs executable NAME.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <memory>
-#include <tuple>
 #include <type_traits>
 
 #include <Eigen/Core>
@@ -44,21 +43,21 @@ struct PaddedPattern {
   }
 };
 
-/// Dissimilarities that patches can be followed by. Magnitudes (sad, agm, pm) have no curvature and
-/// ngf no minimum at equality.
-using TrackableMetrics =
-    std::tuple<metrics::Photo, metrics::Gm, metrics::Gn, metrics::Ugf, metrics::Sgf, metrics::Sgf2,
-               metrics::Sgf3, metrics::Ngv, metrics::Sgv, metrics::Sgf3Vec,
-               alignment::SgfAsExtracted, alignment::Sgf2AsExtracted, alignment::Sgf3AsExtracted>;
+/// Whether patches can be followed by a dissimilarity: `photo`, and those that alignment can
+/// minimise and an offset leaves alone, which look at gradients only. Not by `agm`, whose square is
+/// that of `gm`, nor by `ngf`, which has no minimum at equality.
+template <class Metric>
+inline constexpr bool kFollowable = std::is_same_v<Metric, metrics::Photo> ||
+                                    (alignment::kAlignable<Metric> &&
+                                     Metric::kInfo.traits.offset_invariant &&
+                                     !std::is_same_v<Metric, metrics::Agm> &&
+                                     !std::is_same_v<Metric, metrics::Ngf>);
 
-template <class Residual, class... Metrics>
-constexpr bool IsOf(std::tuple<Metrics...>*) {
-  return (std::is_same_v<Residual, alignment::PointResidual<Metrics>> || ...);
-}
-
+/// The same of a residual.
 template <class Residual>
-inline constexpr bool kTrackable = std::is_same_v<Residual, alignment::LssdResidual> ||
-                                   IsOf<Residual>(static_cast<TrackableMetrics*>(nullptr));
+inline constexpr bool kTrackable = std::is_same_v<Residual, alignment::LssdResidual>;
+template <class Metric>
+inline constexpr bool kTrackable<alignment::PointResidual<Metric>> = kFollowable<Metric>;
 
 /// Whether a residual looks at intensities, so that no gradients have to be made. All others look
 /// at gradients alone.

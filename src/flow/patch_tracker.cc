@@ -337,9 +337,13 @@ class TrackerOf final : public PatchTracker {
       const int n = pattern_.padded;
       Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
       sum.topLeftCorner<3, 3>() = HessianOf<Residual>(J, n);
-      for (int p = 0; p < kParameters; ++p) sum(p, 3) = Dot(J[0][size_t(p)], r[0], n);
+      float squares = 0;
+      for (size_t c = 0; c < r.size(); ++c) {
+        for (int p = 0; p < kParameters; ++p) sum(p, 3) += Dot(J[c][size_t(p)], r[c], n);
+        squares += Dot(r[c], r[c], n);
+      }
       equations.AddSum(sum);
-      equations.AddCost(0.5 * Dot(r[0], r[0], n), pattern_.size);
+      equations.AddCost(0.5 * squares, pattern_.size);
     }
     return equations;
   }

@@ -45,10 +45,11 @@ struct FlowOptions {
 
   template <class V>
   void VisitFields(V&& visit) {
-    visit("residual", residual, "",
-          "what is compared: lssd, photo, gm, gn, ugf, sgf, sgf2, sgf3, ngv, sgv or sgf3_vec; for "
-          "studies "
-          "also sgf_as_extracted, sgf2_as_extracted and sgf3_as_extracted");
+    visit(
+        "residual", residual, "",
+        "what is compared: lssd, photo, or what alignment can minimise and an offset leaves alone, "
+        "such as gm, gn, ugf, sgf, sgf2, sgf3, ngv, sgv, sgf3_vec; for studies also "
+        "sgf_as_extracted, sgf2_as_extracted and sgf3_as_extracted");
     visit("pattern", pattern, "", "pixels of a patch");
     visit("levels", levels, "", "of the image pyramid");
     visit("stereo_levels", stereo_levels, "",

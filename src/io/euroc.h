@@ -64,7 +64,7 @@ EurocSequence ReadEuroc(const std::filesystem::path& folder,
 /// @throws Error naming what cannot be written. So do the functions below.
 void WriteEurocSensors(const std::filesystem::path& folder, const EurocSensors& sensors);
 
-/// File of an image, <folder>/mav0/cam<camera>/data/<time>.png.
+/// File of an image, `folder/mav0/camN/data/TIME.png`.
 std::filesystem::path EurocImagePath(const std::filesystem::path& folder, int camera,
                                      std::int64_t time_ns);
 

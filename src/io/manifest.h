@@ -63,7 +63,7 @@ class FolderLock {
   int descriptor_ = -1;
 };
 
-/// A folder that appears under its name whole or not at all. Work goes to <target>.partial;
+/// A folder that appears under its name whole or not at all. Work goes to `target.partial`;
 /// Commit() gives it its name. An interrupted or failed run leaves an older target as it was, or,
 /// where it ends while Commit() puts the new one in its place, none.
 ///
@@ -72,7 +72,7 @@ class FolderLock {
 ///     staged.Commit(recipe_hash, {{"frames", 1}});
 class StagedFolder {
  public:
-  /// Makes an empty <target>.partial, and the folders above it; what an interrupted run left there
+  /// Makes an empty `target.partial`, and the folders above it; what an interrupted run left there
   /// is removed.
   /// @throws Error naming the folder when that fails or another process works on it.
   explicit StagedFolder(const std::filesystem::path& target);

@@ -10,7 +10,7 @@
 namespace sgf::synth {
 
 /// A frame as layers of an EXR image: R, G, B (half: the radiance of all light groups together),
-/// light.<group>.R, .G, .B and diffuse.R, .G, .B (half), N.X, N.Y, N.Z (half), Z (float, m) and id
+/// light.GROUP.R, .G, .B and diffuse.R, .G, .B (half), N.X, N.Y, N.Z (half), Z (float, m) and id
 /// (uint).
 ExrImage ToExr(const Frame& frame, const Camera& camera, const SE3& T_world_cam);
 
