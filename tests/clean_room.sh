@@ -228,7 +228,6 @@ if ((${#steps[@]} == 0)); then
 fi
 [[ $suite == full || ${steps[*]} == table1 ]] || wrong_usage "an image of suite smoke has neither tests nor packages"
 
-PATH=$PATH:/usr/sbin:/sbin
 for program in apt-get buildah debootstrap flock git unshare; do
   command -v "$program" >/dev/null || fail "$program is not installed"
 done
