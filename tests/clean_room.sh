@@ -117,14 +117,11 @@ make_base() {
 }
 
 build_image() {
-  remove_images "localhost/sgf-$suite"
+  # Those of other commits are in the way: they are large.
+  "${buildah[@]}" images --quiet --filter "reference=localhost/sgf-$suite" |
+    xargs --no-run-if-empty "${buildah[@]}" rmi --force
   contained "${buildah[@]}" bud --isolation chroot --pull-never \
     --build-arg "BASE=$base" --build-arg "SUITE=$suite" --tag "$image" "$work/source"
-}
-
-# remove_images [NAME]: all, or those with this name and any tag.
-remove_images() {
-  "${buildah[@]}" images --quiet "$@" 2>/dev/null | xargs --no-run-if-empty "${buildah[@]}" rmi --force
 }
 
 have_image() {
@@ -250,7 +247,7 @@ running= # step
 trap finish EXIT
 trap 'exit 1' INT TERM HUP
 
-if $fresh; then remove_images; fi
+if $fresh; then "${buildah[@]}" rmi --all --force >/dev/null; fi
 have_image "$base" || step base make_base
 step source export_source
 have_image "$image" || step image build_image
