@@ -30,8 +30,8 @@ RUN case "${SUITE}" in \
     esac \
  && echo 'path-include /usr/share/doc/opencv-doc/examples/data/aloe*' > /etc/dpkg/dpkg.cfg.d/zz-stereo-pair \
  && apt-get update \
- && awk -v sections="${sections}" '{ sub(/#.*/, "") } /^\[/ { wanted = index(sections, $1); next } wanted && NF { print $1 }' \
-      /tmp/packages.apt \
+ && awk -v sections="${sections}" \
+      '{ sub(/#.*/, "") } /^\[/ { wanted = index(sections, $1); next } wanted && NF { print $1 }' /tmp/packages.apt \
     | DEBIAN_FRONTEND=noninteractive xargs apt-get install -y --no-install-recommends \
  && rm -rf /var/lib/apt/lists/* /tmp/packages.apt \
  && install -d /usr/share/beyond-photometric \
