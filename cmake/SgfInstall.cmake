@@ -2,10 +2,10 @@
 include(CMakePackageConfigHelpers)
 
 set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/sgf")
-install(EXPORT sgf-targets NAMESPACE sgf:: DESTINATION "${package_folder}")
+install(EXPORT sgf-targets NAMESPACE sgf:: DESTINATION "${package_folder}" COMPONENT libsgf-dev)
 configure_package_config_file("${CMAKE_CURRENT_LIST_DIR}/sgf-config.cmake.in"
   "${PROJECT_BINARY_DIR}/sgf-config.cmake" INSTALL_DESTINATION "${package_folder}")
 write_basic_package_version_file("${PROJECT_BINARY_DIR}/sgf-config-version.cmake"
   COMPATIBILITY SameMinorVersion)
 install(FILES "${PROJECT_BINARY_DIR}/sgf-config.cmake" "${PROJECT_BINARY_DIR}/sgf-config-version.cmake"
-  DESTINATION "${package_folder}")
+  DESTINATION "${package_folder}" COMPONENT libsgf-dev)

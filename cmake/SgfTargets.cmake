@@ -82,9 +82,10 @@ function(sgf_library name)
   set_target_properties(${target} PROPERTIES
     OUTPUT_NAME sgf_${name} EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
   sgf_precompile_headers(${target})
-  install(TARGETS ${target} EXPORT sgf-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS ${target} EXPORT sgf-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+    COMPONENT libsgf-dev)
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/"
-    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sgf/${name}
+    DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sgf/${name} COMPONENT libsgf-dev
     FILES_MATCHING PATTERN "*.h" PATTERN "*.inc")
   set_property(GLOBAL APPEND PROPERTY SGF_PUBLIC_FOLDERS "${CMAKE_CURRENT_SOURCE_DIR}")
 endfunction()
@@ -96,7 +97,7 @@ function(sgf_app name)
   sgf_compile_options(${name})
   sgf_precompile_headers(${name})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS})
-  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT sgf-tools)
 endfunction()
 
 # sgf_test(NAME SOURCES file... [DEPENDS target...] [LABELS label...] [TIMEOUT seconds])
