@@ -5,15 +5,18 @@ Reading is strict, as that of experiments. Nothing here needs the network or mor
 
 from __future__ import annotations
 
+import functools
 import re
+import reprlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Iterator
+from typing import Any, Iterator, get_args, get_origin, get_type_hints
 
 from sgf_paper import config
-from sgf_paper.config import ConfigError, _build, _build_each, read_yaml
+from sgf_paper.config import ConfigError, _build, read_yaml
 
 CATALOG = config.PROJECT / "datasets" / "catalog.yaml"
+LARGEST_SIZE = 10**15  # bytes
 
 
 @dataclass(frozen=True)
@@ -82,14 +85,56 @@ class Catalog:
         return list(dict.fromkeys(name for names in lists for name in names))
 
 
+_kinds_of = functools.cache(get_type_hints)
+
+
+def _is_of(kind: Any, value: Any) -> bool:
+    """Whether a value of a YAML file is of a type, and what it holds too. True is no number."""
+    outer, inner = get_origin(kind), get_args(kind)
+    if outer is list:
+        return isinstance(value, list) and all(_is_of(inner[0], item) for item in value)
+    if outer is dict:
+        return isinstance(value, dict) and all(all(map(_is_of, inner, item)) for item in value.items())
+    return kind is Any or type(value) is kind
+
+
+def _require(kind: Any, value: Any, where: str) -> None:
+    if not _is_of(kind, value):
+        name = str(kind) if get_origin(kind) else kind.__name__
+        raise ConfigError(f"{where}: expected {name.replace('typing.', '')}, found {reprlib.repr(value)}")
+
+
+def _build_typed(cls: type, node: Any, where: str) -> Any:
+    """As config's, and values have to be of their fields' types."""
+    built = _build(cls, node, where)
+    for name, kind in _kinds_of(cls).items():
+        _require(kind, getattr(built, name), f"{where}.{name}")
+    return built
+
+
+def _build_each(cls: type, nodes: Any, where: str) -> dict[str, Any]:
+    _require(dict[str, Any], nodes, where)
+    return {name: _build_typed(cls, node, f"{where}.{name}") for name, node in nodes.items()}
+
+
 def _require_relative(path: str, where: str) -> None:
-    if path.startswith("/") or ".." in Path(path).parts:
-        raise ConfigError(f"{where}: '{path}' leads out of the data folder")
+    if path.startswith("/") or ".." in Path(path).parts or "\0" in path:
+        raise ConfigError(f"{where}: {path!r} leads out of the data folder")
+
+
+def _require_plain(name: str, where: str) -> None:
+    if not name or name.startswith(".") or set(name) & {"/", "\0"}:
+        raise ConfigError(f"{where}: {name!r} is not a plain file name")
+
+
+def _require_sizes(sizes: list[int], where: str) -> None:
+    if not all(0 <= size < LARGEST_SIZE for size in sizes):
+        raise ConfigError(f"{where}: a number of bytes is negative or beyond {LARGEST_SIZE}")
 
 
 def _check_archive(name: str, archive: Archive, where: str) -> None:
-    if "/" in name or name.startswith("."):
-        raise ConfigError(f"{where}: '{name}' is not a plain file name")
+    _require_plain(name, where)
+    _require_sizes([archive.bytes, archive.about_bytes], where)
     for url in archive.urls:
         if not re.match(r"https?://", url):
             raise ConfigError(f"{where}: '{url}' is neither http:// nor https://")
@@ -98,14 +143,17 @@ def _check_archive(name: str, archive: Archive, where: str) -> None:
             raise ConfigError(f"{where}: {kind} is not {digits} hexadecimal digits")
 
 
-def _load_source(node: dict[str, Any], publishers: dict[str, Publisher], where: str) -> Source:
-    node = dict(node)
+def _load_source(label: str, node: Any, publishers: dict[str, Publisher], where: str) -> Source:
+    _require_plain(label, where)
+    _require(dict[str, Any], node, where)
     name = node.get("publisher")
-    if name not in publishers:
-        raise ConfigError(f"{where}: publisher is {name!r}; known: {', '.join(publishers)}")
-    node["publisher"] = publishers[name]
-    ways = [[_build(Piece, piece, f"{where}.ways") for piece in way] for way in node.get("ways", [])]
-    source = _build(Source, {**node, "ways": ways}, where)
+    if not isinstance(name, str) or name not in publishers:
+        raise ConfigError(f"{where}: publisher is {reprlib.repr(name)}; known: {', '.join(publishers)}")
+    ways = node.get("ways", [])
+    _require(list[list[Any]], ways, f"{where}.ways")
+    ways = [[_build_typed(Piece, piece, f"{where}.ways") for piece in way] for way in ways]
+    source = _build_typed(Source, {**node, "publisher": publishers[name], "ways": ways}, where)
+    _require_sizes([source.unpacked_bytes], where)
     for path in [source.folder, *source.holds, *(piece.to for way in ways for piece in way)]:
         _require_relative(path, where)
     if not source.ways and not source.by_hand:
@@ -131,13 +179,16 @@ def load_catalog(path: Path = CATALOG) -> Catalog:
     """Reads the catalogue."""
     node = {"groups": {}, **read_yaml(path)}
     if set(node) != {"archives", "publishers", "datasets", "groups"}:
-        raise ConfigError(f"{path}: expected archives, publishers, datasets and groups, found {', '.join(node)}")
+        found = ", ".join(map(str, node))
+        raise ConfigError(f"{path}: expected archives, publishers, datasets and groups, found {found}")
+    _require(dict[str, list[str]], node["groups"], f"{path}: groups")
     archives = _build_each(Archive, node["archives"], f"{path}: archives")
     for name, archive in archives.items():
         _check_archive(name, archive, f"{path}: archives.{name}")
     publishers = _build_each(Publisher, node["publishers"], f"{path}: publishers")
+    _require(dict[str, Any], node["datasets"], f"{path}: datasets")
     datasets = {
-        name: _load_source(source, publishers, f"{path}: datasets.{name}")
+        name: _load_source(name, source, publishers, f"{path}: datasets.{name}")
         for name, source in node["datasets"].items()
     }
     catalog = Catalog(archives, datasets, node["groups"])

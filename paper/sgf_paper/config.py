@@ -7,6 +7,8 @@ names the file.
 from __future__ import annotations
 
 import itertools
+import math
+import reprlib
 from abc import ABC, abstractmethod
 from dataclasses import MISSING, asdict, dataclass, field, fields
 from functools import partial
@@ -25,6 +27,10 @@ REFERENCE = PROJECT / "results" / "reference"
 RECIPES = PROJECT / "datasets" / "synthetic"
 STEREO_LAYOUTS = PROJECT / "datasets" / "stereo_layouts.yaml"
 YAML_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same, and faster where PyYAML has it
+# What PyYAML raises over a text, and over a value that is none of its type, such as a 45th of May.
+NOT_YAML = (yaml.YAMLError, ValueError, ArithmeticError, LookupError, AttributeError, TypeError)
+DEEPEST_YAML = 50  # lists and maps in each other
+LARGEST_YAML = 1_000_000  # values
 FIRST_FRAME_STEP = 7  # between runs of odometry
 TUNING_SEED = 1000  # that of a table's run and this make that of a run which options are tuned on
 
@@ -36,7 +42,7 @@ class ConfigError(Exception):
 def _build(cls: type, node: Any, where: str) -> Any:
     """Makes dataclass `cls` of a YAML map whose keys must be exactly its fields."""
     if not isinstance(node, dict):
-        raise ConfigError(f"{where}: expected a map, found {node!r}")
+        raise ConfigError(f"{where}: expected a map, found {reprlib.repr(node)}")
     known = {f.name: f for f in fields(cls)}
     for key in node:
         if key not in known:
@@ -961,13 +967,46 @@ class Dataset:
     scenes: int
 
 
+def _require_shallow(text: str, path: Path) -> None:
+    """@throws ConfigError for lists in lists in lists, over which the readers end by their stack."""
+    depth = 0
+    for event in yaml.parse(text, Loader=YAML_LOADER):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > DEEPEST_YAML:
+            raise ConfigError(f"{path}: line {event.start_mark.line + 1}: nested more than {DEEPEST_YAML} deep")
+
+
+def _written_out(node: yaml.Node, sizes: dict[int, float]) -> float:
+    """Nodes that a node makes, aliases written out; infinite for one that holds itself."""
+    if id(node) not in sizes:
+        sizes[id(node)] = math.inf
+        children = [] if isinstance(node, yaml.ScalarNode) else node.value
+        if isinstance(node, yaml.MappingNode):
+            children = itertools.chain.from_iterable(children)
+        sizes[id(node)] = 1 + sum(_written_out(child, sizes) for child in children)
+    return sizes[id(node)]
+
+
+def _load_yaml(text: str, path: Path) -> Any:
+    """What a YAML text holds, of which a few lines can make more than there is memory for."""
+    _require_shallow(text, path)
+    loader = YAML_LOADER(text)
+    try:
+        root = loader.get_single_node()
+        if root is not None and _written_out(root, {}) > LARGEST_YAML:
+            raise ConfigError(f"{path}: its aliases make more than {LARGEST_YAML} values")
+        return None if root is None else loader.construct_document(root)
+    finally:
+        loader.dispose()
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """Reads a YAML file that holds a map."""
     try:
-        node = yaml.load(path.read_text(), Loader=YAML_LOADER)
+        node = _load_yaml(path.read_text(), path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except yaml.YAMLError as error:
+    except NOT_YAML as error:
         raise ConfigError(f"{path}: {error}") from error
     if not isinstance(node, dict):
         raise ConfigError(f"{path}: expected a map")

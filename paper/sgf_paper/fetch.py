@@ -60,7 +60,12 @@ class Records:
         self._file = file
 
     def read(self) -> dict[str, dict[str, Any]]:
-        return config.read_yaml(self._file) if self._file.exists() else {}
+        """@throws ConfigError for a file that holds anything else."""
+        records = config.read_yaml(self._file) if self._file.exists() else {}
+        for name, record in records.items():
+            if not isinstance(record, dict) or not {"sha256", "first_used"} <= set(record):
+                raise ConfigError(f"{self._file}: {name} has no sha256 and first_used")
+        return records
 
     def add(self, name: str, sha256: str, size: int) -> None:
         """Records an archive that has none."""

@@ -3,15 +3,19 @@
 All members of an archive are looked at before the first byte is written. One that would land outside the folder,
 or is no plain file or folder (a link, a device, a pipe), refuses the whole archive: no data set of the catalogue
 has any. Owners and modes are not taken over.
+
+Of what the libraries can read, only what data sets come in is read here: zip with members as they are or deflated,
+and tar as it is or in gzip. The other ways to pack ask for gigabytes of memory, or make terabytes of a page.
 """
 
 from __future__ import annotations
 
+import errno
 import gzip
-import lzma
 import os
 import shutil
 import stat
+import struct
 import tarfile
 import tempfile
 import zipfile
@@ -25,9 +29,10 @@ from sgf_paper.catalog import Piece
 
 # What the libraries raise over archives that are damaged, encrypted or packed in unknown ways.
 DAMAGE = (
-    zipfile.BadZipFile, tarfile.TarError, zlib.error, gzip.BadGzipFile, lzma.LZMAError, EOFError,
-    RuntimeError, NotImplementedError, ValueError,
+    zipfile.BadZipFile, tarfile.TarError, zlib.error, gzip.BadGzipFile, struct.error, EOFError,
+    RuntimeError, NotImplementedError, ValueError, ArithmeticError, LookupError,
 )  # fmt: skip
+BLOCK = 1 << 16  # bytes read at once
 Parts = tuple[str, ...]
 
 
@@ -65,21 +70,48 @@ def _require_plain(archive: Path, name: str, plain: bool) -> None:
 def _zip_members(archive: Path) -> list[Member]:
     members = []
     with zipfile.ZipFile(archive) as opened:
+        if sum(info.compress_size for info in opened.infolist()) > archive.stat().st_size:
+            raise UnpackError(f"{archive.name}: its members overlap")
         for info in opened.infolist():
             parts = _checked_parts(archive, info.filename)
             kind = stat.S_IFMT(info.external_attr >> 16)  # 0: made where files have no such kinds
             _require_plain(archive, info.filename, kind in (0, stat.S_IFREG, stat.S_IFDIR))
+            if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                raise UnpackError(f"{archive.name}: '{info.filename}' is neither stored nor deflated")
             if not info.is_dir():
                 members.append(Member(info.filename, parts, info.file_size))
     return members
 
 
+class _Blocks:
+    """What tarfile reads from. It believes the sizes that headers state: more at once than a block is refused."""
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream = stream
+        self.tell, self.seek = stream.tell, stream.seek
+
+    def read(self, size: int) -> bytes:
+        if not 0 <= size <= BLOCK:
+            raise tarfile.ReadError(f"a header of {size} bytes")
+        return self._stream.read(size)
+
+
+@contextmanager
+def _open_tar(archive: Path) -> Iterator[tarfile.TarFile]:
+    with archive.open("rb") as file:
+        open_it = gzip.open if file.read(2) == b"\x1f\x8b" else open
+    with open_it(archive, "rb") as stream, tarfile.TarFile(fileobj=_Blocks(stream)) as opened:
+        yield opened
+
+
 def _tar_members(archive: Path) -> list[Member]:
     members = []
-    with tarfile.open(archive) as opened:
+    with _open_tar(archive) as opened:
         for info in opened:
             parts = _checked_parts(archive, info.name)
             _require_plain(archive, info.name, (info.isfile() or info.isdir()) and not info.issparse())
+            if info.size < 0:
+                raise UnpackError(f"{archive.name}: '{info.name}' has a size below 0")
             if info.isfile():
                 members.append(Member(info.name, parts, info.size))
     return members
@@ -88,7 +120,10 @@ def _tar_members(archive: Path) -> list[Member]:
 def is_archive(path: Path) -> bool:
     """Whether a file begins as an archive that can be unpacked here."""
     try:
-        return zipfile.is_zipfile(path) or tarfile.is_tarfile(path)
+        if zipfile.is_zipfile(path):
+            return True
+        with _open_tar(path):
+            return True
     except DAMAGE:
         return False
 
@@ -99,6 +134,9 @@ def _as_unpack_errors(archive: Path) -> Iterator[None]:
         yield
     except DAMAGE as error:
         raise UnpackError(f"{archive.name}: damaged or of an unknown kind: {error}") from error
+    except OSError as error:  # such as of a name that is too long
+        kind = SpaceError if error.errno == errno.ENOSPC else UnpackError
+        raise kind(f"{archive.name}: {error.strerror or error}") from error
 
 
 def list_members(archive: Path) -> list[Member]:
@@ -122,12 +160,17 @@ def _streams(archive: Path, wanted: set[str]) -> Iterator[tuple[str, IO[bytes]]]
                 with opened.open(name) as stream:
                     yield name, stream
         return
-    with tarfile.open(archive) as opened:
+    with _open_tar(archive) as opened:
         for info in opened:
             if info.isfile() and info.name in wanted:
                 yield info.name, opened.extractfile(info)
-        while opened.fileobj.read(1 << 20):
+        while opened.fileobj.read(BLOCK):
             pass
+
+
+def _end_of(tail: Parts, parts: Parts) -> int:
+    """Where in a path some folders in it first end, 0 if they are not in it."""
+    return next((end for end in range(len(tail), len(parts) + 1) if parts[end - len(tail) : end] == tail), 0)
 
 
 def folder_of(members: list[Member], take: str) -> Parts:
@@ -137,12 +180,8 @@ def folder_of(members: list[Member], take: str) -> Parts:
         tops = {parts[:1] for parts in folders}
         return tops.pop() if len(tops) == 1 else ()
     tail = PurePosixPath(take).parts
-    found = {
-        parts[:end]
-        for parts in folders
-        for end in range(len(tail), len(parts) + 1)
-        if parts[end - len(tail) : end] == tail
-    }
+    ends = {parts: _end_of(tail, parts) for parts in folders}
+    found = {parts[:end] for parts, end in ends.items() if end}
     least = min((len(parts) for parts in found), default=0)
     nearest = [parts for parts in found if len(parts) == least]
     if len(nearest) != 1:
@@ -160,7 +199,7 @@ def require_space(folder: Path, needed: int, what: str) -> None:
 def _write(stream: IO[bytes], member: Member, file: Path) -> None:
     file.parent.mkdir(parents=True, exist_ok=True)
     with file.open("wb") as out:
-        shutil.copyfileobj(stream, out, 1 << 20)
+        shutil.copyfileobj(stream, out, BLOCK)
     if file.stat().st_size != member.size:
         raise UnpackError(f"'{member.name}' has {file.stat().st_size} bytes, not {member.size} as stated")
 

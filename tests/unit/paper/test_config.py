@@ -117,3 +117,36 @@ def test_a_figure_takes_the_first_group_at_hand_and_only_scenes_that_exist(tmp_p
 def test_a_figure_of_a_sweep_that_its_table_lacks_is_an_error(table):
     with pytest.raises(ConfigError, match="table9 has no block of sweep stereo_sgm"):
         table.block("stereo_sgm")
+
+
+NINE_OF_EACH = "\n".join(f"{b}: &{b} [{', '.join(9 * ['*' + a])}]" for a, b in zip("abcdefgh", "bcdefghi"))
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("a: [", "while parsing"),
+        (f"a: &a [1]\n{NINE_OF_EACH}", "its aliases make more than 1000000 values"),
+        ("a: &a [*a]", "its aliases make more than"),
+        ("a: " + 100_000 * "[" + 100_000 * "]", "line 1: nested more than 50 deep"),
+        ("a: 2001-13-45", "month must be in"),
+        ("a: !!bool x", "'x'"),
+        ("a: !!int ''", "index out of range"),
+        ("a: !!timestamp x", "NoneType"),
+        ("a: \0", "unacceptable character"),
+        ("7", "expected a map"),
+        ("", "expected a map"),
+    ],
+)  # fmt: skip
+def test_a_text_that_is_no_yaml_is_an_error_with_its_file(tmp_path, text, message):
+    file = tmp_path / "text.yaml"
+    file.write_text(text)
+    with pytest.raises(ConfigError, match="text.yaml: ") as error:
+        config.read_yaml(file)
+    assert message in str(error.value)
+
+
+def test_bytes_that_are_no_text_are_an_error(tmp_path):
+    (tmp_path / "text.yaml").write_bytes(b"a: \xff")
+    with pytest.raises(ConfigError, match="text.yaml: .*can't decode"):
+        config.read_yaml(tmp_path / "text.yaml")

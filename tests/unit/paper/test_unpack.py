@@ -1,5 +1,7 @@
 """Unpacking of archives, honest ones and hostile ones."""
 
+import copy
+import gzip
 import io
 import os
 import stat
@@ -156,6 +158,69 @@ def test_two_members_of_one_place(tmp_path, folder, names):
 def test_a_file_where_a_folder_has_to_be(tmp_path, folder):
     file = write_zip(tmp_path / "data.zip", [("a", b"1"), ("a/b", b"2")])
     with pytest.raises(UnpackError, match="data.zip: a file and a folder want the same place"):
+        unpack.unpack(file, Piece(file.name), folder)
+
+
+def test_a_name_that_no_file_can_have(tmp_path, folder):
+    file = write_zip(tmp_path / "data.zip", [("a/" + 300 * "x", b"1")])
+    with pytest.raises(UnpackError, match="data.zip: File name too long"):
+        unpack.unpack(file, Piece(file.name), folder)
+
+
+def test_a_path_of_very_many_folders(tmp_path, folder):
+    with tarfile.open(tmp_path / "data.tar", "w", format=tarfile.GNU_FORMAT) as archive:
+        archive.addfile(tarfile.TarInfo(20_000 * "a/" + "x"))
+    with pytest.raises(UnpackError, match="data.tar: File name too long"):
+        unpack.unpack(tmp_path / "data.tar", Piece("data.tar", take="a", to="b"), folder)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_a_zip_that_is_packed_in_another_way(tmp_path, folder, method):
+    with zipfile.ZipFile(tmp_path / "data.zip", "w", method) as archive:
+        archive.writestr("a/x", b"1")
+    with pytest.raises(UnpackError, match="data.zip: 'a/x' is neither stored nor deflated"):
+        unpack.unpack(tmp_path / "data.zip", Piece("data.zip"), folder)
+
+
+@pytest.mark.parametrize("how", ["w:bz2", "w:xz"])
+def test_a_tar_that_is_packed_in_another_way(tmp_path, folder, how):
+    file = write_tar(tmp_path / "data.tar", FILES, how)
+    assert not unpack.is_archive(file)
+    with pytest.raises(UnpackError, match="data.tar: neither zip nor tar"):
+        unpack.unpack(file, Piece(file.name), folder)
+
+
+def test_members_of_a_zip_that_share_their_bytes(tmp_path, folder):
+    file = write_zip(tmp_path / "data.zip", [("a/x", 3000 * b"x")])
+    with zipfile.ZipFile(file, "a") as archive:
+        for number in range(3):
+            info = copy.copy(archive.getinfo("a/x"))
+            info.filename = f"a/{number}"
+            archive.filelist.append(info)
+        archive._didModify = True
+    with pytest.raises(UnpackError, match="data.zip: its members overlap"):
+        unpack.unpack(file, Piece(file.name), folder)
+
+
+def tar_header(name, size, kind=tarfile.REGTYPE):
+    info = tarfile.TarInfo(name)
+    info.size, info.type = size, kind
+    return info.tobuf(tarfile.GNU_FORMAT)
+
+
+@pytest.mark.parametrize("kind", [tarfile.GNUTYPE_LONGNAME, tarfile.XHDTYPE])
+@pytest.mark.parametrize("pack", [bytes, gzip.compress])
+def test_a_header_that_asks_for_gigabytes(tmp_path, folder, kind, pack):
+    file = tmp_path / "data.tar"
+    file.write_bytes(pack(tar_header("a", 7 << 30, kind) + bytes(1024)))
+    with pytest.raises(UnpackError, match="data.tar"):
+        unpack.unpack(file, Piece(file.name), folder)
+
+
+def test_a_size_below_zero(tmp_path, folder):
+    file = tmp_path / "data.tar"
+    file.write_bytes(tar_header("a", 0) + tar_header("b", -512) + bytes(1024))
+    with pytest.raises(UnpackError, match="data.tar"):
         unpack.unpack(file, Piece(file.name), folder)
 
 
