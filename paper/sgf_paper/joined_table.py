@@ -12,6 +12,7 @@ import pandas as pd
 
 from sgf_paper import config, style, text, trajectory_table
 from sgf_paper.config import JoinedTable, TableSequence, TrajectoryTable
+from sgf_paper.deviations import load_deviations
 from sgf_paper.style import plt
 
 KEYS = ["condition", "dataset", "sequence", "system", "quantity"]
@@ -48,12 +49,15 @@ class System:
     name: str
     group: str
     published: str  # its row in the paper's table; empty: none
+    column: tuple[str, str] = ("", "")  # the experiment and its column; empty: not ours
 
 
 def list_systems(joined: JoinedTable, external: list[str]) -> list[System]:
     """All systems in the order of the table. @param external names of other systems."""
     own = [
-        System(f"{prefix}_{name}", REBUILT if column.published else BEYOND, column.published)
+        System(
+            f"{prefix}_{name}", REBUILT if column.published else BEYOND, column.published, (part.name, name)
+        )
         for prefix, part in joined.parts.items()
         for name, column in part.columns.items()
     ]
@@ -288,7 +292,8 @@ class Grid:
         ]
         cells += [self._average(system, errors), *self._shares(system)]
         published_as = f" ({system.published})" if system.published not in ("", system.name) else ""
-        return {"group": system.group, "label": system.name + published_as, "cells": cells}
+        label = system.name + published_as
+        return {"group": system.group, "label": label, "column": system.column, "cells": cells}
 
     def block(self) -> dict:
         """What the templates lay out."""
@@ -371,7 +376,7 @@ def make_joined_table(
     text.write_csv(make_timings(own, raw), tables / f"{name}_timings.csv")
     context = {"joined": joined, "blocks": make_blocks(joined, systems, lines), "left_out": left_out}
     for extension in ("md", "tex"):
-        document = text.render(f"joined_table.{extension}.j2", **context)
+        document = text.render(f"joined_table.{extension}.j2", notes=load_deviations(), **context)
         (tables / f"{name}.{extension}").write_text(document)
     runs = pd.concat([own, others.assign(condition=UNDISTURBED)], ignore_index=True).astype({"failed": bool})
     style.save(draw(joined, systems, runs), figures, name)

@@ -18,6 +18,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 from PIL import Image
@@ -25,6 +26,7 @@ from PIL import Image
 from sgf_paper import claims, comparison, config, pairs, report_grid, text
 from sgf_paper.claims import Finding, Tables
 from sgf_paper.config import Report, ReportItem
+from sgf_paper.deviations import Chapter, Notes, load_deviations, read_chapters
 from sgf_paper.report_grid import Grid, Links, Marks, Page
 
 MAIN = config.PAPER / "main.tex"
@@ -68,6 +70,7 @@ class ShownItem:
     printed: list[Grid]  # those that LaTeX gets
     figures: list[str]
     latex: list[str]
+    notes: list[tuple[int, str]]  # deviations from the paper of all of it
 
 
 @dataclass(frozen=True)
@@ -82,6 +85,8 @@ class Contents:
     parts: list[Part]
     pages: list[Page]
     averages: pd.DataFrame
+    deviations: list[Chapter]
+    numbers: dict[str, int]  # of deviations, by key
 
     @property
     def counts(self) -> dict[str, int]:
@@ -127,24 +132,34 @@ def list_parts(results: Path, reasons: dict[str, str], main_file: Callable) -> l
     return parts
 
 
-def show_item(item: ReportItem, part: Part, results: Path, links: Links, marks: Marks) -> ShownItem:
+def groups_of(experiment: Any) -> list[str]:
+    """What deviations of a whole table or figure are listed under."""
+    sweeps = [sweep.name for sweep in experiment.sweeps] if experiment.kind == "table" else []
+    parts = [part.name for part in experiment.parts.values()] if experiment.kind == "joined_table" else []
+    return [experiment.name, *sweeps, *parts]
+
+
+def show_item(
+    item: ReportItem, part: Part, results: Path, links: Links, marks: Marks, notes: Notes
+) -> ShownItem:
     """What there is of a table or figure."""
     if part.reason:
-        return ShownItem(item, part.reason, [], [], [], [])
+        return ShownItem(item, part.reason, [], [], [], [], [])
     tables = results / "tables"
     experiment = config.load_experiment(item.name)
     grids: list[Grid] = []
     if experiment.kind == "table":
-        grids = report_grid.stereo_grids(experiment, tables, links, marks)
+        grids = report_grid.stereo_grids(experiment, tables, links, marks, notes)
     elif experiment.kind == "joined_table":
-        grids = report_grid.joined_grids(experiment, tables, links, marks)
-    own = [(spec, report_grid.csv_grid(spec, tables, links)) for spec in item.tables]
+        grids = report_grid.joined_grids(experiment, tables, links, marks, notes)
+    own = [(spec, report_grid.csv_grid(item.name, spec, tables, links, notes)) for spec in item.tables]
     grids += [grid for _, grid in own if grid]
     return ShownItem(
         item, "", grids,
         printed=[grid for spec, grid in own if grid and not spec.only_html],
         figures=[name for name in item.figures if (results / "figures" / f"{name}.png").exists()],
         latex=[name for name in item.latex if (tables / f"{name}.tex").exists()],
+        notes=sorted({note for group in groups_of(experiment) for note in notes(group)}),
     )  # fmt: skip
 
 
@@ -187,15 +202,18 @@ def gather(name: str, results: Path, reasons: dict[str, str], main_file: Callabl
     marks = Marks(values)
     pages = list_pages(results, parts)
     links = Links(results, pages)
+    notes = load_deviations()
     return Contents(
         report=report,
         findings=find(report, {claims.THIS_RUN: tables, claims.REFERENCE: Tables(config.REFERENCE)}),
         values=values,
         pairs=compare_methods(report, tables),
-        items=[show_item(item, by_name[item.name], results, links, marks) for item in report.items],
+        items=[show_item(item, by_name[item.name], results, links, marks, notes) for item in report.items],
         parts=parts,
         pages=pages,
         averages=comparison.averages(),
+        deviations=read_chapters(),
+        numbers=notes.numbers,
     )
 
 
@@ -232,7 +250,7 @@ def write_fragments(contents: Contents, folder: Path) -> None:
     """Writes what main.tex reads, and main.tex beside it."""
     folder.mkdir(parents=True, exist_ok=True)
     context = {"c": contents, "word": word, "title": title}
-    for name in ("values", "pairs", "parts"):
+    for name in ("values", "pairs", "deviations", "parts"):
         write_whole(folder / f"{name}.tex", text.render(f"report_{name}.tex.j2", **context))
     for chapter, findings in contents.findings.items():
         fragment = text.render("report_claims.tex.j2", chapter=chapter, findings=findings, **context)

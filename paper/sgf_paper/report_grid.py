@@ -4,13 +4,14 @@ value is where that can be said."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pandas as pd
 
 from sgf_paper import claims, comparison, config, joined_table, text
 from sgf_paper.config import JoinedTable, ReportTable, Table, TrajectoryTable
+from sgf_paper.deviations import Notes
 
 NO_VALUE = "the table has no value here"
 PAGES = {"scene": "scene-{}-{}", "sequence": "sequence-{}"}
@@ -25,6 +26,7 @@ class Cell:
     href: str = ""  # relative to the results, or an anchor
     mark: str = ""  # pass, near or fail
     best: bool = False
+    notes: list[tuple[int, str]] = field(default_factory=list)  # deviations from the paper
 
 
 @dataclass(frozen=True)
@@ -79,8 +81,8 @@ class Links:
         return path if path in self.anchors or path and (self.results / path).exists() else ""
 
 
-def csv_grid(spec: ReportTable, folder: Path, links: Links) -> Grid | None:
-    """Lines of a CSV file; None where it is not there."""
+def csv_grid(name: str, spec: ReportTable, folder: Path, links: Links, notes: Notes) -> Grid | None:
+    """Lines of a CSV file of experiment `name`; None where it is not there."""
     path = folder / f"{spec.table}.csv"
     if not path.exists():
         return None
@@ -92,7 +94,11 @@ def csv_grid(spec: ReportTable, folder: Path, links: Links) -> Grid | None:
     rows = []
     for line in lines.to_dict("records"):
         href = links(spec.run.format(**line))
-        rows.append([_csv_cell(line[name], spec.empty.get(name, ""), href) for name in columns])
+        cells = [_csv_cell(line[column], spec.empty.get(column, ""), href) for column in columns]
+        if "column" in columns:
+            at = columns.index("column")
+            cells[at] = replace(cells[at], notes=notes(name, line["column"]))
+        rows.append(cells)
     return Grid(spec.title, columns, rows)
 
 
@@ -118,7 +124,7 @@ class Marks:
         return "" if mark == comparison.NO_MARK else mark
 
 
-def stereo_grids(table: Table, folder: Path, links: Links, marks: Marks) -> list[Grid]:
+def stereo_grids(table: Table, folder: Path, links: Links, marks: Marks, notes: Notes) -> list[Grid]:
     """Tables I and II: blocks of fixed parameters, then of cross-validated ones."""
     main = table.blocks[0].sweep.main_columns
     wins = pd.read_csv(folder / f"{table.name}_wins.csv")
@@ -127,19 +133,22 @@ def stereo_grids(table: Table, folder: Path, links: Links, marks: Marks) -> list
         frame = pd.read_csv(folder / f"{table.name}{end}.csv")
         won = wins if end == "" else wins.iloc[:0]
         for block in text.make_blocks(frame, won, table.quantities, main):
-            grids.append(_stereo_grid(table, block, kind, links, marks if end == "" else None))
+            grids.append(_stereo_grid(table, block, kind, links, marks if end == "" else None, notes))
     return grids
 
 
-def _stereo_grid(table: Table, block: text.Block, kind: str, links: Links, marks: Marks | None) -> Grid:
-    matcher = {title: name for name, title in text.MATCHERS.items()}.get(block.matcher, block.matcher)
+def _stereo_grid(
+    table: Table, block: text.Block, kind: str, links: Links, marks: Marks | None, notes: Notes
+) -> Grid:
+    matcher = text.matcher_name(block.matcher)
     scenes = f"{block.scenes} scenes" if block.scenes else "published values only"
     missing = "no pixel is matched" if block.scenes else f"{block.dataset} is not at hand"
     rows = []
     for row in block.rows:
         scores = f"raw/{matcher}/{block.dataset}/{row.cost}"
         href = links(f"{scores}.csv")
-        cells = [Cell(row.cost + (" (extra)" if row.extra else ""), href=links(f"{scores}.options.yaml"))]
+        shown, options = row.cost + (" (extra)" if row.extra else ""), links(f"{scores}.options.yaml")
+        cells = [Cell(shown, href=options, notes=notes(matcher, row.cost))]
         for quantity, cell in zip(table.quantities, row.cells):
             mark = marks(table.name, f"{matcher}, {block.region}", row.cost, quantity, quantity) if marks else ""
             cells.append(_stereo_cell(cell, missing, href, mark))
@@ -166,7 +175,7 @@ def _won_cell(row: text.Row, block: text.Block, kind: str) -> Cell:
     return empty("counted for fixed parameters only" if block.scenes else f"{block.dataset} is not at hand")
 
 
-def joined_grids(joined: JoinedTable, folder: Path, links: Links, marks: Marks) -> list[Grid]:
+def joined_grids(joined: JoinedTable, folder: Path, links: Links, marks: Marks, notes: Notes) -> list[Grid]:
     """Table III, a block for each data set and condition."""
     light = pd.read_csv(folder / f"{joined.name}_light.csv")
     undisturbed = pd.read_csv(folder / f"{joined.name}.csv").assign(condition=joined_table.UNDISTURBED)
@@ -175,10 +184,11 @@ def joined_grids(joined: JoinedTable, folder: Path, links: Links, marks: Marks) 
     run = set(lines.loc[lines["runs"] > 0, "system"])
     others = sorted(set(lines["system"]) - own | run & set(joined.published))
     systems = joined_table.list_systems(joined, others)
-    return [_joined_grid(joined, block, links, marks) for block in joined_table.make_blocks(joined, systems, lines)]
+    blocks = joined_table.make_blocks(joined, systems, lines)
+    return [_joined_grid(joined, block, links, marks, notes) for block in blocks]
 
 
-def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks) -> Grid:
+def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks, notes: Notes) -> Grid:
     labels = {"_".join(name.split("_")[:2]): (name, label) for name, label in joined_table.labels_of(joined).items()}
     euroc = block["title"].startswith("euroc,")
     heads = [*block["sequences"], "average", "success", "coverage %"]
@@ -186,7 +196,8 @@ def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks) -
     for row in block["rows"]:
         published = row["label"].split("(")[-1].rstrip(")")
         own = row["group"] in (joined_table.REBUILT, joined_table.BEYOND)
-        cells = [Cell(row["label"] + (f" [{row['group']}]" if row["group"] != joined_table.REBUILT else ""))]
+        group = f" [{row['group']}]" if row["group"] != joined_table.REBUILT else ""
+        cells = [Cell(row["label"] + group, notes=notes(*row["column"]))]
         for head, cell in zip(heads, row["cells"]):
             name, label = labels.get(head, ("", "avg"))
             mark = marks(joined.name, "", published, label, "ate_mean_m") if euroc and not cell.reason else ""

@@ -10,6 +10,7 @@ import pandas as pd
 
 from sgf_paper import config, scores, text, tuning
 from sgf_paper.config import Sweep, Table, TableBlock
+from sgf_paper.deviations import load_deviations
 
 CSV_COLUMNS = ["dataset", "region", "matcher", "cost", "quantity", "measured", "published", "scenes"]
 CHOICE_COLUMNS = ["dataset", "region", "matcher", "column", "fold", "parameters", "reached"]
@@ -224,7 +225,7 @@ def make_table(name: str, raw: Path, listing: Path, out: Path) -> None:
         "options": {s.name: options_of_columns(raw, s, present[0]) for s in table.sweeps},
     }
     for extension in ("md", "tex"):
-        document = text.render(f"table.{extension}.j2", **context)
+        document = text.render(f"table.{extension}.j2", notes=load_deviations(), **context)
         (out / f"{name}.{extension}").write_text(document)
 
 

@@ -29,6 +29,11 @@ def matcher_title(matcher: str) -> str:
     return MATCHERS.get(matcher, matcher)
 
 
+def matcher_name(title: str) -> str:
+    """The matcher of that title."""
+    return {shown: name for name, shown in MATCHERS.items()}.get(title, title)
+
+
 @dataclass(frozen=True)
 class Cell:
     """One quantity of one column as text; empty where there is no value."""
@@ -140,7 +145,9 @@ LATEX = {
     **{character: f"\\{character}" for character in "&%$#_{}"},
     **{"\\": "\\textbackslash{}", "~": "\\textasciitilde{}", "^": "\\textasciicircum{}"},
     **{"∞": "$\\infty$", "–": "--", "−": "$-$", "×": "$\\times$", "°": "$^\\circ$", "ε": "$\\varepsilon$"},
-    **{"≥": "$\\geq$", "≤": "$\\leq$"},
+    **{"≥": "$\\geq$", "≤": "$\\leq$", "α": "$\\alpha$", "σ": "$\\sigma$", "τ": "$\\tau$", "√": "$\\surd$"},
+    **{"∂": "$\\partial$", "∇": "$\\nabla$", "‖": "$\\Vert$", "ᵀ": "$^\\top$", "′": "$'$", "⁴": "$^4$", "⁻": "$^-$"},
+    **{"²": "$^2$", "½": "$\\frac12$", "·": "$\\cdot$", "…": "\\dots{}"},
     **{character: f"${character}$" for character in "<>|"},
 }
 
@@ -175,4 +182,5 @@ def render(template: str, **context: object) -> str:
     environment.filters["latex_prose"] = _latex_prose
     environment.filters["html_prose"] = _html_prose
     environment.filters["matcher"] = matcher_title
+    environment.filters["matcher_name"] = matcher_name
     return environment.get_template(template).render(**context)

@@ -11,6 +11,7 @@ import pandas as pd
 
 from sgf_paper import config, paired, repeated_runs, style, text
 from sgf_paper.config import TrajectoryTable
+from sgf_paper.deviations import load_deviations
 from sgf_paper.repeated_runs import KEYS
 from sgf_paper.style import plt
 
@@ -232,7 +233,7 @@ def make_trajectory_table(
         "compared_errors": repeated_runs.ratio_rows(errors),
     }
     for extension in ("md", "tex"):
-        document = text.render(f"trajectory_table.{extension}.j2", **context)
+        document = text.render(f"trajectory_table.{extension}.j2", notes=load_deviations(), **context)
         (tables / f"{name}.{extension}").write_text(document)
     style.save(draw(study, lines), figures, name)
 

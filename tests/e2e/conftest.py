@@ -89,7 +89,8 @@ class Project:
         ignore = shutil.ignore_patterns("__pycache__", "generated")
         for folder in ("paper", "datasets"):
             shutil.copytree(PROJECT / folder, self.root / folder, ignore=ignore)
-        for file in ("reproduce.sh", "packages.apt"):
+        (self.root / "docs").mkdir()
+        for file in ("reproduce.sh", "packages.apt", "docs/deviations.md"):
             shutil.copy2(PROJECT / file, self.root / file)
         for sweep in (self.root / "paper" / "sweeps").iterdir():
             drop_extra_columns(sweep)

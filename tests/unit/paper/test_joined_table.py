@@ -7,7 +7,7 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, joined_table, summary
+from sgf_paper import config, deviations, joined_table, summary
 from sgf_paper.config import ConfigError
 
 NODE = yaml.safe_load((config.EXPERIMENTS / "table3.yaml").read_text())
@@ -251,12 +251,16 @@ def test_documents_lead_to_the_parts_and_explain_themselves(made):
     assert "[table3_dso](table3_dso.md), [table3_vio](table3_vio.md)." in document
     assert "whose sequence is not at hand: slam/V1_01_easy." in document
     assert "| *measured, beyond the paper* | |" in document
-    assert "| vio_lssd (basalt) | 0.0800 (0.076) | (0.045) [a] |" in document
+    link = "[{}](../../docs/deviations.md#{})".format
+    notes = deviations.load_deviations()("table3_vio", "lssd")
+    raised = " ".join(link(number, key) for number, key in notes)
+    assert f"| vio_lssd (basalt) <sup>{raised}</sup> | 0.0800 (0.076) | (0.045) [a] |" in document
     assert (
         "[a]: the sequence is not at hand; [b]: the paper has no value; [c]: no run succeeds; [d]" in document
     )
     latex = (made / "table3.tex").read_text()
-    assert "vio\\_lssd (basalt) & 0.0800 (0.076) & (0.045)$^a$ &" in latex
+    numbers = ",".join(str(number) for number, _ in notes)
+    assert f"vio\\_lssd (basalt)\\textsuperscript{{{numbers}}} & 0.0800 (0.076) & (0.045)$^a$ &" in latex
     assert "\\multicolumn{15}{l}{\\emph{published}} \\\\" in latex and "basalt & 0.076 & 0.045" in latex
     assert latex.count("\\begin{longtable}") == latex.count("\\end{longtable}") == 5
 

@@ -8,12 +8,14 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from sgf_paper import claims, config, report, report_grid, style, summary, text
+from sgf_paper import claims, config, deviations, report, report_grid, style, summary, text
 from sgf_paper.config import ReportTable
+from sgf_paper.deviations import Notes
 from sgf_paper.style import plt
 
 REPORT = config.load_experiment("report")
 MADE = ["table1", "table2", "fig1", "fig2_minima", "fig3", "table3", "table3_dso", "odometry", "density_equal"]
+NO_NOTES = Notes({}, {})
 STUB = "\\begin{longtable}{l}\nstub \\\\\n\\end{longtable}\n"
 
 
@@ -229,7 +231,7 @@ def test_lines_of_a_table_have_reasons_links_and_few_digits(tmp_path):
     folder = write_csv(tmp_path, "name,run,ms,ratio\na,1,12.3456,\nb,2,inf,1.0000\n")
     (tmp_path / "raw" / "1").mkdir(parents=True)
     spec = ReportTable("t", "T", ["name", "ms", "ratio"], empty={"ratio": "lost"}, run="raw/{run}")
-    grid = report_grid.csv_grid(spec, folder, report_grid.Links(tmp_path))
+    grid = report_grid.csv_grid("toy", spec, folder, report_grid.Links(tmp_path), NO_NOTES)
     assert [[cell.shown for cell in row] for row in grid.rows] == [["a", "12.35", "–"], ["b", "∞", "1"]]
     assert [cell.reason for cell in grid.rows[0]] == ["", "", "lost"] and grid.reasons == {"lost": "a"}
     assert grid.rows[0][1].href == "raw/1" and grid.rows[1][1].href == ""
@@ -238,7 +240,7 @@ def test_lines_of_a_table_have_reasons_links_and_few_digits(tmp_path):
 def test_columns_that_a_table_lacks_are_named(tmp_path):
     spec = ReportTable("t", "T", ["colour"])
     with pytest.raises(claims.ClaimError, match="table t has no column colour"):
-        report_grid.csv_grid(spec, write_csv(tmp_path, "a\n1\n"), report_grid.Links(tmp_path))
+        report_grid.csv_grid("toy", spec, write_csv(tmp_path, "a\n1\n"), report_grid.Links(tmp_path), NO_NOTES)
 
 
 def test_reasons_beyond_z_have_two_letters():
@@ -256,3 +258,26 @@ def test_reasons_beyond_z_have_two_letters():
 )
 def test_prose_is_escaped_and_dissimilarities_are_symbols(prose, latex, html):
     assert (text._latex_prose(prose), str(text._html_prose(prose))) == (latex, html)
+
+
+def test_rows_link_to_their_deviations_which_the_page_holds(page):
+    notes = deviations.load_deviations()
+    anchors = re.findall(r'<tr id="deviation-([a-z0-9-]+)"><td>(\d+)</td>', page)
+    assert {key: int(number) for key, number in anchors} == notes.numbers
+    links = re.findall(r'<a href="#deviation-([a-z0-9-]+)" title="\1">(\d+)</a>', page)
+    assert {(key, int(number)) for key, number in links} <= set(notes.numbers.items())
+    orig = re.search(r'<td>(?:<a href="[^"]*">)?orig(?:</a>)? <sup>(.*?)</sup></td>', page)[1]
+    assert re.findall(r"#deviation-([a-z0-9-]+)", orig) == [key for _, key in notes("stereo_bm", "orig")]
+    whole = page.split('id="item-fig2"')[1].split("as a whole: ")[1].split("</p>")[0]
+    assert re.findall(r"#deviation-([a-z0-9-]+)", whole) == [key for _, key in notes("fig2")]
+
+
+def test_the_document_has_the_deviations_too(results):
+    make(results)
+    folder = results / "report"
+    assert "ngf\\textsuperscript{12}" in (folder / "item_fig3.tex").read_text()
+    numbers = [number for number, _ in deviations.load_deviations()("fig2")]
+    shown = f"(Section~\\ref{{deviations}}): {', '.join(map(str, numbers))}."
+    assert shown in (folder / "item_fig2.tex").read_text()
+    lines = (folder / "deviations.tex").read_text()
+    assert lines.count("\\\\\n") == len(deviations.load_deviations().numbers) + len(deviations.read_chapters())

@@ -1,12 +1,14 @@
 """Tables against values worked out by hand."""
 
 import math
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from sgf_paper import config, scores, text
 from sgf_paper.config import Column, Parameters
+from sgf_paper.deviations import Notes
 from sgf_paper.scores import ScoresError
 from sgf_paper.table import (
     CHOICE_COLUMNS,
@@ -180,9 +182,13 @@ def test_only_the_best_column_of_the_paper_is_marked(blocks):
     assert not any(cell.best for row in published.rows for cell in row.cells)
 
 
+NOTES = Notes({"stereo_bm": {"all": ["shared"], "orig": ["other", "own"]}}, {"shared": 7, "own": 3, "other": 12})
+
+
 def render(extension, blocks, table):
     return text.render(
         f"table.{extension}.j2",
+        notes=replace(NOTES, used=set()),
         table=table,
         labels=[text.LABELS[quantity] for quantity in table.quantities],
         absent=["big"],
@@ -207,6 +213,16 @@ def test_markdown_shows_measured_and_published_and_what_is_absent(blocks, two_bl
     assert "MeshStereo, fixed: window 35 px, uniqueness 0 %." in document
     assert "- StereoBM: bad2_pct with 70 % kept; 2 windows x 3 values" in document
     assert "- MeshStereo" not in document
+
+
+def test_rows_link_to_what_they_have_otherwise_than_the_paper(blocks, table):
+    document = render("md", blocks, table)
+    link = "[{}](../../docs/deviations.md#{})".format
+    assert f"| orig <sup>{link(3, 'own')} {link(12, 'other')}</sup> |" in document
+    assert "| ugf (extra) |" in document
+    document = render("tex", blocks, table)
+    assert "\norig\\textsuperscript{3,12} & " in document
+    assert "3 \\texttt{own}, 12 \\texttt{other}.\\par}" in document
 
 
 def test_latex_is_a_tabular_of_equal_rows(blocks, table):
