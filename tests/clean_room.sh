@@ -49,7 +49,7 @@ finish() {
   local code=$?
   trap - EXIT
   [[ -z $child ]] || kill -KILL "$child" 2>/dev/null || true
-  wait
+  wait 2>/dev/null
   "${buildah[@]}" rm --all >/dev/null 2>&1 || true
   [[ $code -eq 0 || -z $running ]] || {
     tail -n 30 "$logs/$running.log" >&3
