@@ -51,7 +51,7 @@ RUN case "${SUITE}" in \
       smoke) ./reproduce.sh --only table1 && cat results/tables/table1.csv \
           && find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + ;; \
     esac \
- && rm build/release/provenance.cc build/release/sgf-config*.cmake \
+ && find build/release -regex '.*/\(provenance.cc\|.*-config.*\.cmake\|CPack.*Config\.cmake\)' -delete \
  && mkdir -p results datasets/generated datasets/downloaded \
  && chmod -R a+rwX .
 

@@ -175,6 +175,7 @@ step_test() {
 
 step_packages() {
   local container
+  in_image cmake --preset release
   in_image cpack --preset release -B /packages
   container=$("${buildah[@]}" from --pull-never "$base")
   run_in "$container" --volume "$work/packages:/packages:ro" --volume "$work/source/tests:/tests:ro" -- \
