@@ -213,12 +213,17 @@ void AddVariant(const std::string& change, const std::string& value, const YAML:
 void ReadVariants(const YAML::Node& root, const std::string& file, Study& study) {
   for (const auto& entry : root["cases"])
     AddVariant(entry.first.Scalar(), "", entry.second, file, study);
-  for (const auto& entry : root["curves"])
+  for (const auto& entry : root["curves"]) {
+    const std::string& option = entry.first.Scalar();
+    if (!entry.second.IsSequence())
+      throw Error(options_internal::At(file, entry.second),
+                  fmt::format("curves.{}: expected a list of values", option));
     for (const YAML::Node& value : entry.second) {
       YAML::Node options;
-      options[entry.first.Scalar()] = value;
-      AddVariant(entry.first.Scalar(), value.Scalar(), options, file, study);
+      options[option] = value;
+      AddVariant(option, value.Scalar(), options, file, study);
     }
+  }
 }
 
 void ReadColumns(const YAML::Node& root, const std::string& file, Study& study) {

@@ -79,6 +79,6 @@ int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   static PyObject* const fuzz = LoadFuzz();
   const sgf::ProcessorTimeLimit limit(10);
   Py_DECREF(OrAbort(PyObject_CallFunction(fuzz, "y#", data, static_cast<Py_ssize_t>(size))));
-  PyGC_Collect();  // or libFuzzer would look for a leak after every input
+  PyGC_Collect();
   return 0;
 }

@@ -50,6 +50,15 @@ def test_a_fuzzer_that_tried_nothing_fails(tmp_path):
     assert run(tmp_path, "exit 0\n", "exr").returncode == 1
 
 
+def test_without_names_all_that_are_built_are_run(tmp_path):
+    ended = run(tmp_path, GOOD)
+    assert ended.returncode == 0
+    assert [line.split()[0] for line in ended.stdout.splitlines()[1:]] == ["exr", "image"]
+    assert "left out: calibration" in ended.stderr
+    (tmp_path / "nothing").mkdir()
+    assert run(tmp_path, GOOD, "--programs", tmp_path / "nothing").returncode == 1
+
+
 def test_an_unknown_name_is_refused(tmp_path):
     ended = run(tmp_path, GOOD, "moon")
     assert ended.returncode == 2

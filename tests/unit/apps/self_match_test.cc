@@ -257,6 +257,7 @@ TEST_F(RunSelfMatchTest, NamesWhatIsWrongInItsFile) {
             ": plain: exposure: must be finite and positive, got -0.9");
   EXPECT_EQ(Run(with("0, 0.5", "0, 1.5")), ": vignette: vignette: must be in [0, 1), got 1.5");
   EXPECT_EQ(Run(with("vignette: [", "vigete: [")), ": unknown key 'vigete'");
+  EXPECT_EQ(Run(with("[0, 0.5]", "{a: 0.5}")), ":10: curves.vignette: expected a list of values");
   EXPECT_EQ(Run(with("[-5, 5]", "[5, -5]")),
             ": ranges: expected pairs of a first disparity and a larger end");
   EXPECT_THAT(Run(with("metric: photo", "metric: foto")), HasSubstr("'foto' is unknown"));
