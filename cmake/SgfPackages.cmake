@@ -1,4 +1,4 @@
-# Debian packages, by `cpack --preset release` (dpkg-dev has to be installed), into build/release/packages. Every
+# Debian packages, by `cpack --preset release` into build/release/packages; it needs dpkg-dev and file. Every
 # install() names the package that its files belong to as its component.
 
 # sgf_package(NAME SECTION section SUMMARY text DESCRIPTION text [DEPENDS package...] [RECOMMENDS package...])
