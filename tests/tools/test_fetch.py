@@ -596,10 +596,10 @@ def test_a_redirect_is_followed_but_not_to_a_file(world):
 
 
 def test_with_too_little_space_nothing_is_begun(world):
-    world.archive["about_bytes"] = 10**18
+    world.archive["about_bytes"] = 10**15
     code, output = world.fetch()
     assert code == 1 and world.server.requests == []
-    assert f"too little space in {world.into}: 1000000000.00 GB needed" in output
+    assert f"too little space in {world.into}: 1000000.00 GB needed" in output
 
 
 def test_a_folder_that_is_there_but_not_complete_is_left_alone(world):
