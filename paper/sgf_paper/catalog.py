@@ -128,7 +128,7 @@ def _require_plain(name: str, where: str) -> None:
 
 
 def _require_sizes(sizes: list[int], where: str) -> None:
-    if not all(0 <= size < LARGEST_SIZE for size in sizes):
+    if not all(0 <= size <= LARGEST_SIZE for size in sizes):
         raise ConfigError(f"{where}: a number of bytes is negative or beyond {LARGEST_SIZE}")
 
 
