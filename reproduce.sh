@@ -42,8 +42,8 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --clean         remove what was built and generated (not results/reference and results/external) and stop
   --help          show this text and stop
 
-Results: results/report.html and .pdf, results/tables, results/figures; logs: results/logs. What is up to date is not made again,
-and an interrupted run goes on where it stopped.
+Results: results/report.html and .pdf, results/tables, results/figures; logs: results/logs. What is up to
+date is not made again, and an interrupted run goes on where it stopped.
 END
 }
 

@@ -5,15 +5,14 @@ Reading is strict, as that of experiments. Nothing here needs the network or mor
 
 from __future__ import annotations
 
-import functools
 import re
 import reprlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Iterator, get_args, get_origin, get_type_hints
+from typing import Any, Iterator
 
 from sgf_paper import config
-from sgf_paper.config import ConfigError, _build, read_yaml
+from sgf_paper.strict_yaml import ConfigError, build_each, build_typed, read_yaml, require
 
 CATALOG = config.PROJECT / "datasets" / "catalog.yaml"
 LARGEST_SIZE = 10**15  # bytes
@@ -85,38 +84,6 @@ class Catalog:
         return list(dict.fromkeys(name for names in lists for name in names))
 
 
-_kinds_of = functools.cache(get_type_hints)
-
-
-def _is_of(kind: Any, value: Any) -> bool:
-    """Whether a value of a YAML file is of a type, and what it holds too. True is no number."""
-    outer, inner = get_origin(kind), get_args(kind)
-    if outer is list:
-        return isinstance(value, list) and all(_is_of(inner[0], item) for item in value)
-    if outer is dict:
-        return isinstance(value, dict) and all(all(map(_is_of, inner, item)) for item in value.items())
-    return kind is Any or type(value) is kind
-
-
-def _require(kind: Any, value: Any, where: str) -> None:
-    if not _is_of(kind, value):
-        name = str(kind) if get_origin(kind) else kind.__name__
-        raise ConfigError(f"{where}: expected {name.replace('typing.', '')}, found {reprlib.repr(value)}")
-
-
-def _build_typed(cls: type, node: Any, where: str) -> Any:
-    """As config's, and values have to be of their fields' types."""
-    built = _build(cls, node, where)
-    for name, kind in _kinds_of(cls).items():
-        _require(kind, getattr(built, name), f"{where}.{name}")
-    return built
-
-
-def _build_each(cls: type, nodes: Any, where: str) -> dict[str, Any]:
-    _require(dict[str, Any], nodes, where)
-    return {name: _build_typed(cls, node, f"{where}.{name}") for name, node in nodes.items()}
-
-
 def _require_relative(path: str, where: str) -> None:
     if path.startswith("/") or ".." in Path(path).parts or "\0" in path:
         raise ConfigError(f"{where}: {path!r} leads out of the data folder")
@@ -145,14 +112,14 @@ def _check_archive(name: str, archive: Archive, where: str) -> None:
 
 def _load_source(label: str, node: Any, publishers: dict[str, Publisher], where: str) -> Source:
     _require_plain(label, where)
-    _require(dict[str, Any], node, where)
+    require(dict[str, Any], node, where)
     name = node.get("publisher")
     if not isinstance(name, str) or name not in publishers:
         raise ConfigError(f"{where}: publisher is {reprlib.repr(name)}; known: {', '.join(publishers)}")
     ways = node.get("ways", [])
-    _require(list[list[Any]], ways, f"{where}.ways")
-    ways = [[_build_typed(Piece, piece, f"{where}.ways") for piece in way] for way in ways]
-    source = _build_typed(Source, {**node, "publisher": publishers[name], "ways": ways}, where)
+    require(list[list[Any]], ways, f"{where}.ways")
+    ways = [[build_typed(Piece, piece, f"{where}.ways") for piece in way] for way in ways]
+    source = build_typed(Source, {**node, "publisher": publishers[name], "ways": ways}, where)
     _require_sizes([source.unpacked_bytes], where)
     for path in [source.folder, *source.holds, *(piece.to for way in ways for piece in way)]:
         _require_relative(path, where)
@@ -181,12 +148,12 @@ def load_catalog(path: Path = CATALOG) -> Catalog:
     if set(node) != {"archives", "publishers", "datasets", "groups"}:
         found = ", ".join(map(str, node))
         raise ConfigError(f"{path}: expected archives, publishers, datasets and groups, found {found}")
-    _require(dict[str, list[str]], node["groups"], f"{path}: groups")
-    archives = _build_each(Archive, node["archives"], f"{path}: archives")
+    require(dict[str, list[str]], node["groups"], f"{path}: groups")
+    archives = build_each(Archive, node["archives"], f"{path}: archives", build_typed)
     for name, archive in archives.items():
         _check_archive(name, archive, f"{path}: archives.{name}")
-    publishers = _build_each(Publisher, node["publishers"], f"{path}: publishers")
-    _require(dict[str, Any], node["datasets"], f"{path}: datasets")
+    publishers = build_each(Publisher, node["publishers"], f"{path}: publishers", build_typed)
+    require(dict[str, Any], node["datasets"], f"{path}: datasets")
     datasets = {
         name: _load_source(name, source, publishers, f"{path}: datasets.{name}")
         for name, source in node["datasets"].items()

@@ -7,15 +7,13 @@ names the file.
 from __future__ import annotations
 
 import itertools
-import math
-import reprlib
 from abc import ABC, abstractmethod
-from dataclasses import MISSING, asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Union
 
-import yaml
+from sgf_paper.strict_yaml import ConfigError, build, build_each, read_yaml
 
 PAPER = Path(__file__).resolve().parent.parent
 PROJECT = PAPER.parent
@@ -28,36 +26,8 @@ DEVIATIONS_TEXT = PROJECT / "docs" / "deviations.md"
 REFERENCE = PROJECT / "results" / "reference"
 RECIPES = PROJECT / "datasets" / "synthetic"
 STEREO_LAYOUTS = PROJECT / "datasets" / "stereo_layouts.yaml"
-YAML_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same, and faster where PyYAML has it
-# What PyYAML raises over a text, and over a value that is none of its type, such as a 45th of May.
-NOT_YAML = (yaml.YAMLError, ValueError, ArithmeticError, LookupError, AttributeError, TypeError)
-DEEPEST_YAML = 50  # lists and maps in each other
-LARGEST_YAML = 1_000_000  # values
 FIRST_FRAME_STEP = 7  # between runs of odometry
 TUNING_SEED = 1000  # that of a table's run and this make that of a run which options are tuned on
-
-
-class ConfigError(Exception):
-    """What is wrong in a file of settings; the text names file and key."""
-
-
-def _build(cls: type, node: Any, where: str) -> Any:
-    """Makes dataclass `cls` of a YAML map whose keys must be exactly its fields."""
-    if not isinstance(node, dict):
-        raise ConfigError(f"{where}: expected a map, found {reprlib.repr(node)}")
-    known = {f.name: f for f in fields(cls)}
-    for key in node:
-        if key not in known:
-            raise ConfigError(f"{where}: unknown key '{key}'; known: {', '.join(known)}")
-    for name, f in known.items():
-        if name not in node and f.default is MISSING and f.default_factory is MISSING:
-            raise ConfigError(f"{where}: key '{name}' is missing")
-    return cls(**node)
-
-
-def _build_each(cls: type, nodes: dict[str, Any], where: str) -> dict[str, Any]:
-    """Makes dataclass `cls` of each of some named YAML maps."""
-    return {name: _build(cls, node, f"{where}.{name}") for name, node in nodes.items()}
 
 
 @dataclass(frozen=True)
@@ -969,66 +939,20 @@ class Dataset:
     scenes: int
 
 
-def _require_shallow(text: str, path: Path) -> None:
-    """@throws ConfigError for lists in lists in lists, over which the readers end by their stack."""
-    depth = 0
-    for event in yaml.parse(text, Loader=YAML_LOADER):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > DEEPEST_YAML:
-            raise ConfigError(f"{path}: line {event.start_mark.line + 1}: nested more than {DEEPEST_YAML} deep")
-
-
-def _written_out(node: yaml.Node, sizes: dict[int, float]) -> float:
-    """Nodes that a node makes, aliases written out; infinite for one that holds itself."""
-    if id(node) not in sizes:
-        sizes[id(node)] = math.inf
-        children = [] if isinstance(node, yaml.ScalarNode) else node.value
-        if isinstance(node, yaml.MappingNode):
-            children = itertools.chain.from_iterable(children)
-        sizes[id(node)] = 1 + sum(_written_out(child, sizes) for child in children)
-    return sizes[id(node)]
-
-
-def _load_yaml(text: str, path: Path) -> Any:
-    """What a YAML text holds, of which a few lines can make more than there is memory for."""
-    _require_shallow(text, path)
-    loader = YAML_LOADER(text)
-    try:
-        root = loader.get_single_node()
-        if root is not None and _written_out(root, {}) > LARGEST_YAML:
-            raise ConfigError(f"{path}: its aliases make more than {LARGEST_YAML} values")
-        return None if root is None else loader.construct_document(root)
-    finally:
-        loader.dispose()
-
-
-def read_yaml(path: Path) -> dict[str, Any]:
-    """Reads a YAML file that holds a map."""
-    try:
-        node = _load_yaml(path.read_text(), path)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from error
-    except NOT_YAML as error:
-        raise ConfigError(f"{path}: {error}") from error
-    if not isinstance(node, dict):
-        raise ConfigError(f"{path}: expected a map")
-    return node
-
-
 def load_sweep(name: str) -> Sweep:
     """Reads paper/sweeps/<name>.yaml."""
     path = SWEEPS / f"{name}.yaml"
-    sweep = _build(Sweep, read_yaml(path), str(path))
-    sweep.grid = _build(Grid, sweep.grid, f"{path}: grid")
-    sweep.columns = _build_each(Column, sweep.columns, f"{path}: columns")
+    sweep = build(Sweep, read_yaml(path), str(path))
+    sweep.grid = build(Grid, sweep.grid, f"{path}: grid")
+    sweep.columns = build_each(Column, sweep.columns, f"{path}: columns")
     return sweep
 
 
 def _build_block(node: dict[str, Any], where: str) -> TableBlock:
-    block = _build(TableBlock, node, where)
+    block = build(TableBlock, node, where)
     if block.tuning is not None:
-        block.tuning = _build(Tuning, block.tuning, f"{where}: tuning")
-    _build(Parameters, block.fixed, f"{where}: fixed")
+        block.tuning = build(Tuning, block.tuning, f"{where}: tuning")
+    build(Parameters, block.fixed, f"{where}: fixed")
     block.sweep = load_sweep(block.sweep)
     for column in block.sweep.columns:
         parameters = block.parameters(column)
@@ -1040,13 +964,13 @@ def _build_block(node: dict[str, Any], where: str) -> TableBlock:
 
 
 def _build_table(node: dict[str, Any], where: str) -> Table:
-    table = _build(Table, node, where)
+    table = build(Table, node, where)
     table.blocks = [_build_block(block, f"{where}: blocks") for block in table.blocks]
     return table
 
 
 def _build_light_change(node: dict[str, Any], where: str) -> LightChange:
-    experiment = _build(LightChange, node, where)
+    experiment = build(LightChange, node, where)
     for sweep in load_experiment(experiment.table).sweeps:
         if unknown := set(experiment.columns) - set(sweep.columns):
             raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep.name}")
@@ -1054,13 +978,13 @@ def _build_light_change(node: dict[str, Any], where: str) -> LightChange:
 
 
 def _build_group(node: dict[str, Any], where: str) -> SceneGroup:
-    group = _build(SceneGroup, node, where)
-    scenes = [_build(FigureScene, scene, f"{where}: scenes") for scene in group.scenes]
+    group = build(SceneGroup, node, where)
+    scenes = [build(FigureScene, scene, f"{where}: scenes") for scene in group.scenes]
     return SceneGroup(group.dataset, group.title, scenes)
 
 
 def _build_figure(node: dict[str, Any], where: str) -> DisparityFigure:
-    figure = _build(DisparityFigure, node, where)
+    figure = build(DisparityFigure, node, where)
     figure.groups = [_build_group(group, f"{where}: groups") for group in figure.groups]
     for sweep in figure.sweeps:
         if unknown := set(figure.columns) - set(load_sweep(sweep).columns):
@@ -1069,9 +993,9 @@ def _build_figure(node: dict[str, Any], where: str) -> DisparityFigure:
 
 
 def _build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
-    figure = _build(SemiDense, node, where)
-    figure.rows = [_build(SemiDenseRow, row, f"{where}: rows") for row in figure.rows]
-    figure.columns = _build_each(SemiDenseColumn, figure.columns, f"{where}: columns")
+    figure = build(SemiDense, node, where)
+    figure.rows = [build(SemiDenseRow, row, f"{where}: rows") for row in figure.rows]
+    figure.columns = build_each(SemiDenseColumn, figure.columns, f"{where}: columns")
     for key in ("min_gradient", "min_epipolar_gradient", "bad_pct"):
         if key not in figure.study:
             raise ConfigError(f"{where}: study: key '{key}' is missing")
@@ -1084,9 +1008,9 @@ def _build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
 
 
 def _build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
-    figure = _build(SelfMatch, node, where)
-    figure.groups = [_build(FrameGroup, group, f"{where}: groups") for group in figure.groups]
-    figure.columns = _build_each(SelfMatchColumn, figure.columns, f"{where}: columns")
+    figure = build(SelfMatch, node, where)
+    figure.groups = [build(FrameGroup, group, f"{where}: groups") for group in figure.groups]
+    figure.columns = build_each(SelfMatchColumn, figure.columns, f"{where}: columns")
     if figure.figure_case not in figure.cases:
         raise ConfigError(f"{where}: figure_case '{figure.figure_case}' is not among the cases")
     if unknown := set(figure.figure_columns) - set(figure.columns):
@@ -1098,11 +1022,11 @@ def _build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
 
 
 def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
-    study = _build(Convergence, node, where)
-    study.image_sets = [_build(ImageSet, images, f"{where}: image_sets") for images in study.image_sets]
+    study = build(Convergence, node, where)
+    study.image_sets = [build(ImageSet, images, f"{where}: image_sets") for images in study.image_sets]
     if study.image_sets[-1].datasets:
         raise ConfigError(f"{where}: image_sets: the last one must need no data set")
-    study.columns = _build_each(ConvergenceColumn, study.columns, f"{where}: columns")
+    study.columns = build_each(ConvergenceColumn, study.columns, f"{where}: columns")
     if unknown := set(study.drawn) - set(study.columns):
         raise ConfigError(f"{where}: drawn: no column {sorted(unknown)}")
     return study
@@ -1110,15 +1034,15 @@ def _build_convergence(node: dict[str, Any], where: str) -> Convergence:
 
 def _build_on_sequences(cls: type, node: dict[str, Any], where: str, of: type = TrackedSequence) -> Any:
     """Makes dataclass `cls`, a SequenceExperiment on sequences `of` a class, of a YAML map."""
-    experiment = _build(cls, node, where)
-    experiment.sequences = _build_each(of, experiment.sequences, f"{where}: sequences")
+    experiment = build(cls, node, where)
+    experiment.sequences = build_each(of, experiment.sequences, f"{where}: sequences")
     return experiment
 
 
 def _build_direct_map(node: dict[str, Any], where: str) -> DirectMap:
     figure = _build_on_sequences(DirectMap, node, where)
-    figure.points = _build(MapPoints, figure.points, f"{where}: points")
-    figure.surface = _build(OffSurface, figure.surface, f"{where}: surface")
+    figure.points = build(MapPoints, figure.points, f"{where}: points")
+    figure.surface = build(OffSurface, figure.surface, f"{where}: surface")
     limits = figure.surface.doubled_m
     if len(limits) != 2 or not 0 <= limits[0] < limits[1]:
         raise ConfigError(f"{where}: surface: doubled_m is {limits}; it has to be two distances, least first")
@@ -1147,9 +1071,9 @@ def _build_odometry(node: dict[str, Any], where: str) -> Odometry:
 
 def _build_trajectory_table(node: dict[str, Any], where: str) -> TrajectoryTable:
     study = _build_on_sequences(TrajectoryTable, node, where, TableSequence)
-    study.programs = _build_each(TrackingProgram, study.programs, f"{where}: programs")
-    study.columns = _build_each(TrackingColumn, study.columns, f"{where}: columns")
-    study.conditions = _build_each(TrackingCondition, study.conditions, f"{where}: conditions")
+    study.programs = build_each(TrackingProgram, study.programs, f"{where}: programs")
+    study.columns = build_each(TrackingColumn, study.columns, f"{where}: columns")
+    study.conditions = build_each(TrackingCondition, study.conditions, f"{where}: conditions")
     for name, column in study.columns.items():
         if column.program not in study.programs:
             raise ConfigError(f"{where}: columns.{name}: no program '{column.program}'")
@@ -1161,7 +1085,7 @@ def _build_trajectory_table(node: dict[str, Any], where: str) -> TrajectoryTable
 
 
 def _build_joined_table(node: dict[str, Any], where: str) -> JoinedTable:
-    joined = _build(JoinedTable, node, where)
+    joined = build(JoinedTable, node, where)
     joined.parts = {prefix: load_experiment(name) for prefix, name in joined.parts.items()}
     for part in joined.parts.values():
         if part.kind != "trajectory_table":
@@ -1201,10 +1125,10 @@ def _check_tuning(tuning: TrackingTuning, where: str) -> None:
 def _build_tuning(node: dict[str, Any], where: str) -> TrackingTuning:
     if "like" in node:
         node = {**read_yaml(EXPERIMENTS / f"{node['like']}.yaml"), "by_name_only": False, **node}
-    tuning = _build(TrackingTuning, node, where)
+    tuning = build(TrackingTuning, node, where)
     tuning.table = _load_untuned_table(tuning.table)
-    tuning.space = _build_each(SearchRange, tuning.space, f"{where}: space")
-    tuning.budget = _build(TuningBudget, tuning.budget, f"{where}: budget")
+    tuning.space = build_each(SearchRange, tuning.space, f"{where}: space")
+    tuning.budget = build(TuningBudget, tuning.budget, f"{where}: budget")
     _check_tuning(tuning, where)
     tuning.columns = tuning.columns or list(tuning.table.columns)
     return tuning
@@ -1212,11 +1136,11 @@ def _build_tuning(node: dict[str, Any], where: str) -> TrackingTuning:
 
 def _build_list(cls: type, nodes: list[dict[str, Any]], where: str) -> list[Any]:
     """Makes dataclass `cls` of each of some YAML maps."""
-    return [_build(cls, node, where) for node in nodes]
+    return [build(cls, node, where) for node in nodes]
 
 
 def _build_report(node: dict[str, Any], where: str) -> Report:
-    report = _build(Report, node, where)
+    report = build(Report, node, where)
     for item in report.items:
         item["tables"] = _build_list(ReportTable, item.get("tables", []), f"{where}: {item.get('name')}: tables")
     report.items = _build_list(ReportItem, report.items, f"{where}: items")
@@ -1228,10 +1152,10 @@ def _build_report(node: dict[str, Any], where: str) -> Report:
 
 
 BUILDERS = {
-    "benchmark": partial(_build, Benchmark),
-    "contact_sheet": partial(_build, ContactSheet),
+    "benchmark": partial(build, Benchmark),
+    "contact_sheet": partial(build, ContactSheet),
     "convergence": _build_convergence,
-    "density": partial(_build, Density),
+    "density": partial(build, Density),
     "direct_map": _build_direct_map,
     "disparity_figure": _build_figure,
     "joined_table": _build_joined_table,
@@ -1241,8 +1165,8 @@ BUILDERS = {
     "report": _build_report,
     "self_match": _build_self_match,
     "semi_dense": _build_semi_dense,
-    "sequences": partial(_build, Sequences),
-    "shift_profile": partial(_build, ShiftProfile),
+    "sequences": partial(build, Sequences),
+    "shift_profile": partial(build, ShiftProfile),
     "table": _build_table,
     "trajectory_table": _build_trajectory_table,
     "tuning": _build_tuning,
@@ -1331,7 +1255,7 @@ def load_published_rows(table: TrajectoryTable) -> dict[str, dict[str, float]]:
 def load_comparisons() -> dict[str, Comparison]:
     """How published tables are compared, by their entry in the published values."""
     where = f"{PUBLISHED}: comparison"
-    comparisons = _build_each(Comparison, _published_entry("comparison"), where)
+    comparisons = build_each(Comparison, _published_entry("comparison"), where)
     for name, comparison in comparisons.items():
         _published_entry(name)
         comparison.tolerances = _build_list(Tolerance, comparison.tolerances, f"{where}.{name}: tolerances")
@@ -1342,11 +1266,11 @@ def _build_check(node: dict[str, Any], where: str) -> Check:
     kind = node.get("kind")
     if kind not in CHECKS:
         raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(CHECKS)}")
-    return _build(CHECKS[kind], {key: value for key, value in node.items() if key != "kind"}, where)
+    return build(CHECKS[kind], {key: value for key, value in node.items() if key != "kind"}, where)
 
 
 def _build_claim(node: dict[str, Any], where: str) -> Claim:
-    claim = _build(Claim, node, where)
+    claim = build(Claim, node, where)
     where = f"{where}.{claim.id}"
     claim.checks = [_build_check(check, f"{where}: checks") for check in claim.checks]
     claim.published = [_build_check(check, f"{where}: published") for check in claim.published]
@@ -1355,7 +1279,7 @@ def _build_claim(node: dict[str, Any], where: str) -> Claim:
 
 def load_claims(path: Path = CLAIMS) -> Claims:
     """Reads what is claimed and how it is checked."""
-    claims = _build(Claims, read_yaml(path), str(path))
+    claims = build(Claims, read_yaml(path), str(path))
     for chapter in ("claims", "slips", "new"):
         nodes = getattr(claims, chapter)
         setattr(claims, chapter, [_build_claim(node, f"{path}: {chapter}") for node in nodes])
@@ -1370,7 +1294,7 @@ def load_external_system(folder: Path) -> ExternalSystem:
     path = folder / "align.yaml"
     if not path.exists():
         return ExternalSystem()
-    system = _build(ExternalSystem, read_yaml(path), str(path))
+    system = build(ExternalSystem, read_yaml(path), str(path))
     for key, known in {"frame": ("body", "camera"), "align": ("se3", "sim3")}.items():
         if getattr(system, key) not in known:
             raise ConfigError(f"{path}: {key} is {getattr(system, key)!r}; known: {', '.join(known)}")

@@ -8,7 +8,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pandas as pd
-from PIL import Image
 
 from sgf_paper import config, images, style, text
 from sgf_paper.config import FrameGroup, SelfMatch

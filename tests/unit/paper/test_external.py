@@ -1,7 +1,6 @@
 """Trajectories of other systems: what is read to the digit, which sequence it is of, and mistakes."""
 
 import sys
-from pathlib import Path
 
 import pandas as pd
 import pytest

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from sgf_paper import config, scores, text
+from sgf_paper import scores, text
 from sgf_paper.config import Column, Parameters
 from sgf_paper.deviations import Notes
 from sgf_paper.scores import ScoresError
