@@ -177,7 +177,8 @@ int64_t SumSquaredGradient(const cv::Mat1b& image, GradientOperator op, int begi
   return total;
 }
 
-// MakeSample<float> and QuantizeSample on lanes, in the same order of operations.
+// MakeSample<float> and QuantizeSample (tests/support/fixed_point.h, which also bounds the error) on
+// lanes, in the same order of operations.
 // @param epsilon one value, or with `epsilon_map` one a column.
 HWY_INLINE void QuantizeRow(const float* gx, const float* gy, const float* epsilon,
                             bool epsilon_map, float tau, int scale, int width, SgfRow& out) {

@@ -78,9 +78,6 @@ Patches Lathe(const std::vector<Eigen::Vector2f>& profile);
 /// where there is no room; open at both ends.
 Patches Tube(const std::vector<Eigen::Vector3f>& path, float radius);
 
-/// Ring about z with centre line radius `radius`, centred at the origin.
-Patches Torus(float radius, float tube_radius);
-
 /// Soft box whose faces bulge by `puff` m in their middle, except the one it lies on: cushions,
 /// mattresses, sacks.
 Patches Cushion(float x, float y, float z, float puff);

@@ -505,18 +505,6 @@ Patches Tube(const std::vector<Eigen::Vector3f>& path, float radius) {
   return patches;
 }
 
-Patches Torus(float radius, float tube_radius) {
-  const int nu = 48, nv = 24;
-  const auto point = [&](int i, int j) {
-    const Vector2f c = Circle(j, nv);
-    return OnCircle(i, nu, radius + tube_radius * c.x(), tube_radius * c.y());
-  };
-  return {MakeGrid(nu, nv, point, [&](int i, int j) {
-    const Vector2f c = Circle(j, nv);
-    return OnCircle(i, nu, c.x(), c.y());
-  })};
-}
-
 Patches Cushion(float x, float y, float z, float puff) {
   const SoftBox box{Vector3f(x / 2, y / 2, z / 2), 0.3f * std::min({x, y, z}), puff};
   Patches patches;

@@ -6,7 +6,7 @@
 #include <fmt/core.h>
 #include <gtest/gtest.h>
 
-#include <sgf/metrics/fixed_point.h>
+#include <support/fixed_point.h>
 
 namespace sgf::metrics {
 namespace {

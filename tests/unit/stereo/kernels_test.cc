@@ -10,7 +10,7 @@
 #include <support/stereo_images.h>
 
 #include <sgf/core/simd.h>
-#include <sgf/metrics/fixed_point.h>
+#include <support/fixed_point.h>
 #include <sgf/metrics/registry.h>
 #include <sgf/metrics/sample_image.h>
 #include <sgf/stereo/band.h>

@@ -50,7 +50,7 @@ TEST(SurfaceFinder, CountsLampsAsSurfacesOfNoObject) {
 TEST(SurfaceFinder, FindsNothingFartherThanTheNearestPointOfAGrid) {
   Scene scene;
   scene.name = "round";
-  scene.Add("torus", Torus(1, 0.3f), Material{});
+  scene.Add("sphere", Sphere(0.9f), Material{});
   scene.Add("cushion",
             Transformed(Cushion(1, 1, 0.3f, 0.05f), Eigen::Affine3f(Eigen::Translation3f(0, 3, 0))),
             Material{});

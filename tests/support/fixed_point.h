@@ -7,7 +7,8 @@
 #include <sgf/metrics/normalized_metrics.h>
 #include <sgf/metrics/sample.h>
 
-/// sgf in 16-bit fixed point: the scalar definition that the SIMD kernels reproduce bit for bit.
+/// sgf in 16-bit fixed point: the scalar definition that the SIMD kernels (src/stereo/sgf_rows-inl.h)
+/// reproduce bit for bit, and how far it is from the exact one.
 namespace sgf::metrics {
 
 /// 16-bit number with 15 fractional bits, with the arithmetic of the SIMD instruction sets.
