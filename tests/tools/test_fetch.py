@@ -8,6 +8,7 @@ import os
 import random
 import signal
 import subprocess
+import sys
 import tarfile
 import threading
 import time
@@ -258,6 +259,32 @@ def test_the_list_needs_no_folder_and_no_network(world, server):
 def test_what_is_downloaded_for_experiments(tmp_path):
     done = subprocess.run([PROGRAM, "--for", "fig1", "--into", tmp_path], capture_output=True, text=True)
     assert done.returncode == 1 and "icl_nuim_lr_kt2" in done.stdout and "euroc" not in done.stdout
+
+
+def test_without_pyyaml_its_package_is_named():
+    done = subprocess.run([sys.executable, "-S", PROGRAM, "--list"], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stdout == ""
+    assert done.stderr == "Error: PyYAML is not installed (Debian package python3-yaml)\n"
+
+
+def test_a_reader_that_goes_away_ends_it_silently():
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([PROGRAM, "--list"], stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert done.returncode == -signal.SIGPIPE and done.stderr == b""
+
+
+def test_a_closed_output_does_not_keep_it_from_its_work(by_hand):
+    command = ["sh", "-c", '"$@" >&-', "sh", *by_hand.command("toy")]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and done.stderr == ""
+
+
+def test_a_folder_may_have_any_name(world):
+    world.into = world.root / os.fsdecode(b"d\xe4ta")
+    code, output = world.fetch()
+    assert code == 0 and world.is_right() and r"d\udce4ta/toys/train" in last_line(output), output
 
 
 # ---- Licences, wrong usage
