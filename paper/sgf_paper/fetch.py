@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import shutil
 import sys
 from dataclasses import dataclass, field
@@ -26,6 +27,9 @@ from sgf_paper.download import DownloadError, Patience
 from sgf_paper.unpack import UnpackError
 
 LOCK_WAIT_S = 5  # aria2 notices within a second that who started it was killed
+UNPACKING = ".sgf-unpacking"  # folder beside the data in which they are unpacked
+# What the options may be. aria2 takes no more connections to a server, and waits no longer.
+LIMITS = {"jobs": (1, 16), "timeout": (1, 600), "attempts": (1, 100), "pause": (0, 3600)}
 
 
 class FetchError(Exception):
@@ -394,20 +398,23 @@ def parse_arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME", help="data sets or groups of them (see --list)")
     parser.add_argument("--for", nargs="+", dest="experiments", default=[], metavar="EXPERIMENT",
                         help="also those that experiments of the paper use")  # fmt: skip
-    parser.add_argument("--into", type=Path, metavar="DIR", help="folder for all data sets, as --data takes it")
+    parser.add_argument("--into", metavar="DIR", help="folder for all data sets, as --data takes it")
     parser.add_argument("--list", action="store_true", help="list data sets, licences and groups, and stop")
     parser.add_argument("--accept-licences", action="store_true", help="of what is downloaded; without it: nothing")
-    parser.add_argument("--jobs", type=int, default=Patience.connections, help="connections per archive")
+    parser.add_argument("--jobs", type=int, default=Patience.connections, help="connections per archive, at most 16")
     parser.add_argument("--catalog", type=Path, default=catalogs.CATALOG, help="another catalogue")
-    parser.add_argument("--timeout", type=int, default=Patience.timeout_s, help="s without data until a new attempt")
+    parser.add_argument("--timeout", type=int, default=Patience.timeout_s,
+                        help="s without data until a new attempt, at most 600")  # fmt: skip
     parser.add_argument("--attempts", type=int, default=Patience.attempts, help="in a row that bring nothing new")
     parser.add_argument("--pause", type=float, default=Patience.pause_s, help="s after an attempt; doubles")
     parsed = parser.parse_args(arguments)
     if not parsed.list and not (parsed.into and (parsed.names or parsed.experiments)):
         parser.error("needs data sets and --into DIR, or --list")
-    for option in ("jobs", "timeout", "attempts"):
-        if getattr(parsed, option) < 1:
-            parser.error(f"--{option} needs a positive number, not {getattr(parsed, option)}")
+    if parsed.into and os.path.lexists(parsed.into) and not os.path.isdir(parsed.into):
+        parser.error(f"--into needs a folder, which {parsed.into} is not")
+    for option, (least, most) in LIMITS.items():
+        if not least <= (value := getattr(parsed, option)) <= most:
+            parser.error(f"--{option} needs a number from {least} to {most}, not {value}")
     return parsed
 
 
@@ -419,12 +426,12 @@ def main(arguments: list[str] | None = None) -> int:
     except ConfigError as error:
         print(f"Error: {error}", file=sys.stderr)
         return 2
-    if parsed.list:
-        list_datasets(catalog, names)
-        return 0
     patience = Patience(parsed.jobs, parsed.timeout, parsed.attempts, parsed.pause)
     try:
-        return run(catalog, names, parsed.into.resolve(), parsed.accept_licences, patience)
+        if parsed.list:
+            list_datasets(catalog, names)
+            return 0
+        return run(catalog, names, Path(parsed.into).absolute(), parsed.accept_licences, patience)
     except (FetchError, ConfigError, OSError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1
