@@ -132,8 +132,12 @@ class Fetcher:
     def folder(self, name: str) -> Path:
         return self.into / self.catalog.datasets[name].folder
 
+    def lacks(self, name: str) -> str:
+        """Something that a data set's folder lacks; empty if it is complete."""
+        return unpack.lacks(self.folder(name), self.catalog.datasets[name].holds)
+
     def is_there(self, name: str) -> bool:
-        return unpack.is_complete(self.folder(name), self.catalog.datasets[name].holds)
+        return not self.lacks(name)
 
     def file(self, archive: str) -> Path:
         """Where an archive is: one that the user put into the folder, or the place of a downloaded one."""
@@ -142,8 +146,9 @@ class Fetcher:
 
     def is_by_hand(self, name: str) -> bool:
         """Whether a data set has to be fetched by the user, and its archive is not there yet."""
-        names = self.catalog.datasets[name].archives
-        return not any(self.catalog.archives[a].urls or self.file(a).is_file() for a in names)
+        at_hand = {a for a in self.catalog.datasets[name].archives if self.file(a).is_file()}
+        ways = [{p.archive for p in way} for way in self.catalog.datasets[name].ways]
+        return not any(all(self.catalog.archives[a].urls for a in way - at_hand) for way in ways)
 
     def _missing_bytes(self, archive: str) -> int:
         if self.file(archive).is_file():
@@ -215,7 +220,8 @@ class Fetcher:
             self._check(name)
         except FetchError as error:
             if self.file(name).is_file():
-                raise FetchError(f"{self.file(name)}: {error}") from error
+                self.failed[name] = f"{self.file(name)}: {error}"
+                raise FetchError(self.failed[name]) from error
 
     def _forget(self, name: str) -> None:
         """Removes a downloaded archive that did not unpack, unless a checksum says that it is the right one."""
@@ -229,9 +235,9 @@ class Fetcher:
         for piece in way:
             say(f"  {name}: unpacking {piece.inside or piece.archive}")
             unpack.unpack(self.file(piece.archive), piece, folder)
-        if lacking := [path for path in self.catalog.datasets[name].holds if not (folder / path).exists()]:
+        if lacking := unpack.lacks(folder, self.catalog.datasets[name].holds):
             archives = " and ".join(piece.archive for piece in way)
-            raise UnpackError(f"{archives}: no {lacking[0]} in what was unpacked")
+            raise UnpackError(f"{archives}: no {lacking} in what was unpacked")
 
     def _make_folder(self, name: str, way: list[Piece]) -> None:
         """Makes a data set's folder from the pieces of a way, whole or not at all."""
@@ -292,7 +298,7 @@ def take(folder: Path) -> int:
 
 def hand_line(source: Source, fetcher: Fetcher) -> str:
     """What a user has to do for a data set."""
-    archives = " and ".join(source.archives)
+    archives = " and ".join(a for a in source.archives if not fetcher.catalog.archives[a].urls)
     place = f"put {archives} into {fetcher.into} and fetch again" if archives else ""
     unpack_line = f"unpack to {fetcher.into / source.folder}"
     return f"by hand: {source.by_hand}; then {place or unpack_line}"

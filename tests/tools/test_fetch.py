@@ -358,6 +358,38 @@ def test_a_wrong_archive_that_the_user_put_there_is_named_and_kept(by_hand):
     assert (by_hand.into / "toy.zip").exists()
 
 
+def test_a_wrong_archive_is_read_once_for_all_that_comes_from_it(by_hand, monkeypatch):
+    by_hand.into.mkdir()
+    (by_hand.into / "toy.zip").write_bytes(HTML)
+    by_hand.command()
+    read = []
+    checksums = fetch.checksums_of
+    monkeypatch.setattr(fetch, "checksums_of", lambda file: read.append(file.name) or checksums(file))
+    fetcher = fetch.Fetcher(catalog.load_catalog(by_hand.root / "catalog.yaml"), by_hand.into, Patience())
+    for _ in range(2):
+        with pytest.raises(fetch.FetchError, match=f"{by_hand.into}/toy.zip: toy.zip is neither"):
+            fetcher.get_archive("toy.zip")
+    assert read == ["toy.zip"]
+
+
+def test_an_empty_folder_is_not_at_hand(by_hand):
+    del by_hand.node["datasets"]["toy"]["ways"], by_hand.node["datasets"]["toy"]["holds"]
+    (by_hand.into / "toys" / "train").mkdir(parents=True)
+    code, output = by_hand.fetch()
+    assert code == 1 and f"then unpack to {by_hand.into}/toys/train" in last_line(output)
+    (by_hand.into / "toys" / "train" / "a").mkdir()
+    code, output = by_hand.fetch()
+    assert code == 0 and "at hand: " in last_line(output)
+
+
+def test_what_comes_in_part_by_hand_is_not_begun_without_that_part(by_hand):
+    by_hand.node["archives"]["net.zip"] = {"urls": [f"{by_hand.server.address}/net.zip"]}
+    by_hand.node["datasets"]["toy"]["ways"][0].insert(0, {"archive": "net.zip"})
+    code, output = by_hand.fetch()
+    assert code == 1 and "by hand: log in at https://example.org/login" in last_line(output)
+    assert f"then put toy.zip into {by_hand.into}" in last_line(output) and by_hand.server.requests == []
+
+
 # ---- Servers that fail
 
 
