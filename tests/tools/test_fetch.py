@@ -10,9 +10,11 @@ import signal
 import subprocess
 import sys
 import tarfile
+import tempfile
 import threading
 import time
 import zipfile
+from pathlib import Path
 
 import pytest
 import yaml
@@ -189,6 +191,15 @@ def world(tmp_path, server):
     return World(tmp_path, server)
 
 
+@pytest.fixture
+def shared(world):
+    """The data sets `toy` and `tests` of one archive."""
+    toy = world.node["datasets"]["toy"]
+    way = [{"archive": "toy.zip", "take": "test"}]
+    world.node["datasets"]["tests"] = {**toy, "folder": "tests", "holds": ["x.png"], "ways": [way]}
+    return world
+
+
 def last_line(output):
     return output.splitlines()[-1].strip()
 
@@ -237,15 +248,11 @@ def test_a_tar_archive_in_pieces_and_an_archive_within_an_archive(world):
     assert (world.into / "flight/mav0/x").read_bytes() == b"x"
 
 
-def test_data_sets_that_share_an_archive_download_it_once(world):
-    toy = world.node["datasets"]["toy"]
-    world.node["datasets"]["tests"] = {
-        **toy, "folder": "tests", "holds": ["x.png"], "ways": [[{"archive": "toy.zip", "take": "test"}]],
-    }  # fmt: skip
-    world.server.manners["toy.zip"] = "no ranges"
-    code, output = world.fetch("toy", "tests")
-    assert code == 0 and world.is_right() and (world.into / "tests" / "x.png").exists(), output
-    assert output.count("from http") == 1 and world.left_over() == []
+def test_data_sets_that_share_an_archive_download_it_once(shared):
+    shared.server.manners["toy.zip"] = "no ranges"
+    code, output = shared.fetch("toy", "tests")
+    assert code == 0 and shared.is_right() and (shared.into / "tests" / "x.png").exists(), output
+    assert output.count("from http") == 1 and shared.left_over() == []
 
 
 def test_the_list_needs_no_folder_and_no_network(world, server):
@@ -664,17 +671,121 @@ def test_a_redirect_is_followed_but_not_to_a_file(world):
 
 def test_with_too_little_space_nothing_is_begun(world):
     world.archive["about_bytes"] = 10**15
+    part = world.into / ".sgf-fetch" / "toy.zip.part"
+    part.parent.mkdir(parents=True)
+    part.write_bytes(bytes(10_000_000))
     code, output = world.fetch()
     assert code == 1 and world.server.requests == []
-    assert f"too little space in {world.into}: 1000000.00 GB needed" in output
+    assert f"too little space in {world.into}: 999999.99 GB needed" in output
+    assert f"{part}: 0.01 GB, for toy" in output, "what could be deleted"
+
+
+def raise_that_space_is_short(folder, needed, what):
+    raise fetch.unpack.SpaceError(f"{what} needs more")
+
+
+def test_when_space_runs_out_no_other_way_is_downloaded(world, monkeypatch, capsys):
+    world.node["archives"]["own.zip"] = {"urls": [f"{world.server.address}/own.zip"]}
+    world.node["datasets"]["toy"]["ways"].append([{"archive": "own.zip", "take": "train"}])
+    world.command()
+    monkeypatch.setattr(fetch.unpack, "require_space", raise_that_space_is_short)
+    read = catalog.load_catalog(world.root / "catalog.yaml")
+    assert fetch.run(read, ["toy"], world.into, True, Patience()) == 1
+    assert "FAILED: unpacking toy.zip needs more" in last_line(capsys.readouterr().out)
+    assert {name for name, _ in world.server.requests} == {"toy.zip"} and world.left_over() == ["toy.zip"]
 
 
 def test_a_folder_that_is_there_but_not_complete_is_left_alone(world):
     (world.into / "toys" / "train" / "mine").mkdir(parents=True)
     code, output = world.fetch()
     assert code == 1 and world.server.requests == []
-    assert f"{world.into}/toys/train is there without all of a/im0.png" in last_line(output)
+    assert f"{world.into}/toys/train is there without a/im0.png" in last_line(output)
     assert (world.into / "toys" / "train" / "mine").is_dir()
+
+
+@pytest.mark.parametrize("other", ["file", "link that leads nowhere"])
+@pytest.mark.parametrize("place", ["toys", "toys/train"])
+def test_something_else_in_the_place_of_a_folder_is_found_before_the_download(world, place, other):
+    path = world.into / place
+    path.parent.mkdir(parents=True)
+    path.write_text("mine") if other == "file" else path.symlink_to("nowhere")
+    code, output = world.fetch()
+    assert code == 1 and world.server.requests == []
+    assert f"{path} is {'not a folder' if place == 'toys' else 'there without a/im0.png'}" in last_line(output)
+    assert os.path.lexists(path) and [entry.name for entry in path.parent.iterdir()].count(path.name) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_found_before_the_download(world):
+    world.into.mkdir()
+    (world.into / "toys").symlink_to("/proc")
+    code, output = world.fetch()
+    assert code == 1 and world.server.requests == []
+    assert "FAILED" in last_line(output) and f"{world.into}/toys/.sgf-unpacking" in last_line(output)
+
+
+@pytest.fixture
+def other_disk(tmp_path):
+    """A folder on another file system."""
+    shared_memory = Path("/dev/shm")
+    if not shared_memory.is_dir() or shared_memory.stat().st_dev == tmp_path.stat().st_dev:
+        pytest.skip("there is no second file system")
+    with tempfile.TemporaryDirectory(dir=shared_memory) as folder:
+        yield Path(folder)
+
+
+def test_the_data_may_lie_on_another_disk(world, other_disk):
+    world.node["datasets"]["toy"]["unpacked_bytes"] = 20_000_000
+    world.into.mkdir()
+    (world.into / "toys").symlink_to(other_disk)
+    code, output = world.fetch()
+    assert code == 0 and world.is_right() and world.left_over() == [], output
+    assert [path.name for path in other_disk.iterdir()] == ["train"]
+    needed = [line.split(";")[0].strip() for line in output.splitlines() if "are free in" in line]
+    assert needed == ["needs about 0.00 GB", "needs about 0.02 GB"]
+
+
+def test_the_downloads_may_lie_on_another_disk(world, other_disk):
+    world.into.mkdir()
+    (world.into / ".sgf-fetch").symlink_to(other_disk)
+    code, output = world.fetch()
+    assert code == 0 and world.is_right() and world.left_over() == [], output
+
+
+def test_an_archive_is_kept_until_all_that_comes_from_it_is_there(shared):
+    code, output = shared.fetch()
+    assert code == 0 and shared.left_over() == ["toy.zip"]
+    assert f"{shared.into}/.sgf-fetch/toy.zip: 0.00 GB, for tests" in output and "== archives kept" in output
+    shared.server.requests.clear()
+    code, output = shared.fetch("tests")
+    assert code == 0 and shared.left_over() == [] and "== archives kept" not in output, output
+    assert shared.server.requests == []
+
+
+def test_what_a_kill_left_of_complete_data_sets_goes_with_the_next_fetch(shared):
+    shared.fetch()
+    shared.fetch("tests")
+    (shared.into / ".sgf-fetch" / "toy.zip").write_bytes(shared.toy)
+    other = {**shared.node["datasets"]["toy"], "folder": "other", "ways": [[{"archive": "none.zip"}]]}
+    shared.node["datasets"]["other"] = other
+    shared.node["archives"]["none.zip"] = {"urls": [f"{shared.server.address}/none.zip"]}
+    assert shared.fetch("other")[0] == 1 and shared.left_over() == []
+
+
+@pytest.mark.parametrize("name, accept, code", [("toy", True, 0), ("toy", False, 0), ("tests", False, 1)])
+def test_what_another_fetch_works_on_is_left_alone(shared, name, accept, code):
+    shared.fetch()
+    work = shared.into / ".sgf-fetch"
+    unpacked = shared.into / ".sgf-unpacking" / "tests" / "x.png"
+    unpacked.parent.mkdir(parents=True)
+    for file in (unpacked, work / "toy.zip", work / "toy.zip.part", work / "toy.zip.part.aria2"):
+        file.touch()
+    before = sorted(shared.into.rglob("*"))
+    lock = fetch.take(shared.into)
+    try:
+        assert shared.fetch(name, accept=accept)[0] == code
+    finally:
+        os.close(lock)
+    assert sorted(shared.into.rglob("*")) == before
 
 
 def test_two_at_once_do_not_share_a_folder(world, monkeypatch):
@@ -699,6 +810,7 @@ def test_a_kill_while_unpacking_leaves_no_half_of_a_data_set(world, monkeypatch)
     code, output = world.fetch()
     assert code == 0 and world.is_right() and world.left_over() == [], output
     assert world.server.requests == [], "what was downloaded is not downloaded again"
+    assert sorted(path.name for path in world.into.iterdir()) == [".sgf-fetch", "toys"]
 
 
 def test_without_aria2_its_package_is_named(world, monkeypatch):
