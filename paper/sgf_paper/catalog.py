@@ -5,6 +5,7 @@ Reading is strict, as that of experiments. Nothing here needs the network or mor
 
 from __future__ import annotations
 
+import itertools
 import re
 import reprlib
 from dataclasses import dataclass, field
@@ -16,6 +17,8 @@ from sgf_paper.strict_yaml import ConfigError, build_each, build_typed, read_yam
 
 CATALOG = config.PROJECT / "datasets" / "catalog.yaml"
 LARGEST_SIZE = 10**15  # bytes
+LONGEST_NAME = 200  # bytes; file systems take 255, and names get longer while their files are made
+ARCHIVE_NAMES = (".zip", ".tar", ".tar.gz", ".tgz")
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class Source:
     publisher: Publisher
     folder: str  # below the data root
     citation: str = ""
-    holds: list[str] = field(default_factory=list)  # files or folders without which it is not complete
+    holds: list[str] = field(default_factory=list)  # files or folders without which it is not complete; none: any
     unpacked_bytes: int = 0  # about
     by_hand: str = ""  # how to get what fetch cannot download
     ways: list[list[Piece]] = field(default_factory=list)  # pieces that make the folder; the first that works counts
@@ -84,14 +87,21 @@ class Catalog:
         return list(dict.fromkeys(name for names in lists for name in names))
 
 
+def _require_short(name: str, where: str) -> None:
+    if any(len(part.encode(errors="replace")) > LONGEST_NAME for part in Path(name).parts):
+        raise ConfigError(f"{where}: {reprlib.repr(name)} is longer than {LONGEST_NAME} bytes")
+
+
 def _require_relative(path: str, where: str) -> None:
     if path.startswith("/") or ".." in Path(path).parts or "\0" in path:
         raise ConfigError(f"{where}: {path!r} leads out of the data folder")
+    _require_short(path, where)
 
 
 def _require_plain(name: str, where: str) -> None:
     if not name or name.startswith(".") or set(name) & {"/", "\0"}:
         raise ConfigError(f"{where}: {name!r} is not a plain file name")
+    _require_short(name, where)
 
 
 def _require_sizes(sizes: list[int], where: str) -> None:
@@ -101,13 +111,15 @@ def _require_sizes(sizes: list[int], where: str) -> None:
 
 def _check_archive(name: str, archive: Archive, where: str) -> None:
     _require_plain(name, where)
+    if not name.endswith(ARCHIVE_NAMES):
+        raise ConfigError(f"{where}: the name ends in none of {', '.join(ARCHIVE_NAMES)}")
     _require_sizes([archive.bytes, archive.about_bytes], where)
     for url in archive.urls:
         if not re.match(r"https?://", url):
             raise ConfigError(f"{where}: '{url}' is neither http:// nor https://")
     for kind, digits in (("sha256", 64), ("md5", 32)):
         if not re.fullmatch(rf"|[0-9a-f]{{{digits}}}", getattr(archive, kind)):
-            raise ConfigError(f"{where}: {kind} is not {digits} hexadecimal digits")
+            raise ConfigError(f"{where}: {kind} is not {digits} hexadecimal digits in lower case")
 
 
 def _load_source(label: str, node: Any, publishers: dict[str, Publisher], where: str) -> Source:
@@ -123,6 +135,10 @@ def _load_source(label: str, node: Any, publishers: dict[str, Publisher], where:
     _require_sizes([source.unpacked_bytes], where)
     for path in [source.folder, *source.holds, *(piece.to for way in ways for piece in way)]:
         _require_relative(path, where)
+    if str(Path(source.folder)).startswith("."):  # the data folder itself, or hidden, as fetch's own are
+        raise ConfigError(f"{where}: folder {source.folder!r} is not a plain one below the data folder")
+    if not all(ways):
+        raise ConfigError(f"{where}.ways: one has no pieces")
     if not source.ways and not source.by_hand:
         raise ConfigError(f"{where}: has neither ways nor by_hand")
     return source
@@ -135,7 +151,13 @@ def _check_names(catalog: Catalog, path: Path) -> None:
                 raise ConfigError(f"{path}: datasets.{name}: no archive '{archive}'")
             if not catalog.archives[archive].urls and not source.by_hand:
                 raise ConfigError(f"{path}: datasets.{name}: '{archive}' has no urls, and there is no by_hand")
+    places = sorted((Path(source.folder).parts, name) for name, source in catalog.datasets.items())
+    for (outer, first), (inner, second) in itertools.pairwise(places):
+        if inner[: len(outer)] == outer:
+            raise ConfigError(f"{path}: datasets.{second}: its folder is, or lies in, that of '{first}'")
     for group, names in catalog.groups.items():
+        if not names:
+            raise ConfigError(f"{path}: groups.{group}: names no data set")
         if unknown := set(names) - set(catalog.datasets):
             raise ConfigError(f"{path}: groups.{group}: no data set '{sorted(unknown)[0]}'")
         if group in catalog.datasets:
@@ -176,13 +198,14 @@ def _texts(node: Any) -> Iterator[str]:
 
 def needed_by(experiments: list[str], catalog: Catalog) -> list[str]:
     """Data sets for fetch that experiments, and those that they refer to, name or whose files they name."""
+    known = {file.stem for file in config.EXPERIMENTS.glob("*.yaml")}
     waiting, seen, words = list(experiments), set(), set()
     while waiting:
         name = waiting.pop()
         seen.add(name)
         texts = set(_texts(read_yaml(config.EXPERIMENTS / f"{name}.yaml")))
         words |= texts
-        waiting += [text for text in texts - seen if (config.EXPERIMENTS / f"{text}.yaml").is_file()]
+        waiting += texts & known - seen
     return [
         name
         for name, source in catalog.datasets.items()

@@ -32,7 +32,7 @@ class DownloadError(Exception):
 class Patience:
     """How long an address may take."""
 
-    connections: int = 4
+    connections: int = 4  # at most 16, as aria2 allows for one server
     timeout_s: int = 60  # without a byte
     attempts: int = 6  # in a row that bring nothing new
     pause_s: float = 5  # after the first of them; doubles
@@ -77,7 +77,7 @@ def _command(url: str, part: Path, patience: Patience) -> list[str]:
         "aria2c", "--no-conf", "--no-netrc", f"--user-agent={USER_AGENT}",
         f"--dir={part.parent}", f"--out={part.name}", "--allow-overwrite=true", "--auto-file-renaming=false",
         "--continue", "--always-resume=false", "--max-resume-failure-tries=0", "--auto-save-interval=1",
-        f"--split={patience.connections}", f"--max-connection-per-server={min(patience.connections, 16)}",
+        f"--split={patience.connections}", f"--max-connection-per-server={patience.connections}",
         "--min-split-size=1M", "--file-allocation=none",
         "--max-tries=1", f"--timeout={patience.timeout_s}", f"--connect-timeout={patience.timeout_s}",
         "--disk-cache=0", "--follow-torrent=false", "--follow-metalink=false",

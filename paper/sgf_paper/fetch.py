@@ -1,20 +1,25 @@
 """Downloads, checks and unpacks the data sets of datasets/catalog.yaml, and says what is to be fetched by hand.
 
 Run it again after a failure or a kill: it goes on from what has arrived, and leaves alone what is complete. Never
-asks anything. Exit code 0: all named data sets are there; 1: one is not, and why was said; 2: wrong usage.
+asks anything. An archive is kept as long as a data set of the catalogue that comes from it is not there: the output
+says which, to be deleted by who wants no more of it. Exit code 0: all named data sets are there; 1: one is not, and
+why was said; 2: wrong usage.
 """
 
 from __future__ import annotations
 
 import argparse
 import hashlib
+import os
 import shutil
 import sys
+from collections import Counter
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import date
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Iterator
 
 import yaml
 
@@ -26,6 +31,9 @@ from sgf_paper.download import DownloadError, Patience
 from sgf_paper.unpack import UnpackError
 
 LOCK_WAIT_S = 5  # aria2 notices within a second that who started it was killed
+UNPACKING = ".sgf-unpacking"  # folder beside the data in which they are unpacked
+# What the options may be. aria2 takes no more connections to a server, and waits no longer.
+LIMITS = {"jobs": (1, 16), "timeout": (1, 600), "attempts": (1, 100), "pause": (0, 3600)}
 
 
 class FetchError(Exception):
@@ -106,14 +114,19 @@ def check(name: str, archive: Archive, file: Path, records: Records) -> str:
 # ---- Fetching
 
 
+def nearest_folder(path: Path) -> Path:
+    """A folder, or the nearest one around it that exists."""
+    return next(folder for folder in (path, *path.parents) if folder.is_dir())
+
+
 @dataclass
 class Fetcher:
-    """Fetches data sets into a folder, which has to be taken first (see take())."""
+    """Fetches data sets into a folder, which has to be taken first (see take()), and knows what is in it."""
 
     catalog: Catalog
     into: Path
     patience: Patience
-    lock: int = -1  # the open file that holds the folder, once it is taken
+    lock: int | None = None  # the open file that holds the folder, once it is taken
     checked: dict[str, str] = field(default_factory=dict)  # SHA-256 of archives that are right, by name
     failed: dict[str, str] = field(default_factory=dict)  # why archives cannot be had, by name
 
@@ -128,8 +141,12 @@ class Fetcher:
     def folder(self, name: str) -> Path:
         return self.into / self.catalog.datasets[name].folder
 
+    def lacks(self, name: str) -> str:
+        """Something that a data set's folder lacks; empty if it is complete."""
+        return unpack.lacks(self.folder(name), self.catalog.datasets[name].holds)
+
     def is_there(self, name: str) -> bool:
-        return unpack.is_complete(self.folder(name), self.catalog.datasets[name].holds)
+        return not self.lacks(name)
 
     def file(self, archive: str) -> Path:
         """Where an archive is: one that the user put into the folder, or the place of a downloaded one."""
@@ -138,8 +155,9 @@ class Fetcher:
 
     def is_by_hand(self, name: str) -> bool:
         """Whether a data set has to be fetched by the user, and its archive is not there yet."""
-        names = self.catalog.datasets[name].archives
-        return not any(self.catalog.archives[a].urls or self.file(a).is_file() for a in names)
+        at_hand = {a for a in self.catalog.datasets[name].archives if self.file(a).is_file()}
+        ways = [{p.archive for p in way} for way in self.catalog.datasets[name].ways]
+        return not any(all(self.catalog.archives[a].urls for a in way - at_hand) for way in ways)
 
     def _missing_bytes(self, archive: str) -> int:
         if self.file(archive).is_file():
@@ -147,13 +165,23 @@ class Fetcher:
         part = self.work / f"{archive}.part"
         return max(self.catalog.archives[archive].expected_bytes - download.arrived(part), 0)
 
-    def needed_bytes(self, names: list[str]) -> int:
-        """About what fetching data sets the first way takes, archives and what is unpacked together."""
-        sources = [self.catalog.datasets[name] for name in names]
-        archives = {piece.archive for source in sources for way in source.ways[:1] for piece in way}
-        unpacked = sum(source.unpacked_bytes for source in sources)
-        inner = max((s.unpacked_bytes for s in sources for w in s.ways[:1] for p in w if p.inside), default=0)
-        return sum(map(self._missing_bytes, archives)) + unpacked + inner
+    def needed_bytes(self, names: list[str]) -> dict[Path, int]:
+        """About what fetching data sets the first way takes, by a folder on each file system.
+
+        Archives take it here, and what is unpacked where it will lie.
+        """
+        sources = {name: self.catalog.datasets[name] for name in names}
+        first = {name: [piece for way in source.ways[:1] for piece in way] for name, source in sources.items()}
+        takes = [(self.folder(name).parent, source.unpacked_bytes) for name, source in sources.items()]
+        inner = [take for take, pieces in zip(takes, first.values()) if any(piece.inside for piece in pieces)]
+        takes += sorted(inner, key=lambda take: take[1])[-1:]  # one after the other, so only the largest
+        takes += [(self.work, self._missing_bytes(a)) for a in {p.archive for pieces in first.values() for p in pieces}]
+        folders: dict[int, Path] = {}  # by file system
+        needed: Counter[Path] = Counter()
+        for place, count in [(self.into, 0), *takes]:
+            folder = nearest_folder(place)
+            needed[folders.setdefault(folder.stat().st_dev, folder)] += count
+        return needed
 
     def _report(self, name: str, done: int) -> None:
         total = self.catalog.archives[name].expected_bytes
@@ -211,7 +239,8 @@ class Fetcher:
             self._check(name)
         except FetchError as error:
             if self.file(name).is_file():
-                raise FetchError(f"{self.file(name)}: {error}") from error
+                self.failed[name] = f"{self.file(name)}: {error}"
+                raise FetchError(self.failed[name]) from error
 
     def _forget(self, name: str) -> None:
         """Removes a downloaded archive that did not unpack, unless a checksum says that it is the right one."""
@@ -225,19 +254,27 @@ class Fetcher:
         for piece in way:
             say(f"  {name}: unpacking {piece.inside or piece.archive}")
             unpack.unpack(self.file(piece.archive), piece, folder)
-        if lacking := [path for path in self.catalog.datasets[name].holds if not (folder / path).exists()]:
+        if lacking := unpack.lacks(folder, self.catalog.datasets[name].holds):
             archives = " and ".join(piece.archive for piece in way)
-            raise UnpackError(f"{archives}: no {lacking[0]} in what was unpacked")
+            raise UnpackError(f"{archives}: no {lacking} in what was unpacked")
 
-    def _make_folder(self, name: str, way: list[Piece]) -> None:
-        """Makes a data set's folder from the pieces of a way, whole or not at all."""
+    @contextmanager
+    def _place_to_unpack(self, name: str) -> Iterator[Path]:
+        """A new folder on the file system that a data set will lie on: renaming does not lead from one to another."""
+        work = nearest_folder(self.folder(name).parent) / UNPACKING
+        shutil.rmtree(work, ignore_errors=True)
+        try:
+            (work / name).mkdir(parents=True)
+            yield work / name
+        finally:
+            shutil.rmtree(work, ignore_errors=True)
+
+    def _get_and_unpack(self, name: str, way: list[Piece], folder: Path) -> None:
+        """Has the pieces of a way in a folder."""
         archives = dict.fromkeys(piece.archive for piece in way)
         sizes = {archive: self.get_archive(archive).stat().st_size for archive in archives}
-        unpacked = self.work / "unpacking" / name
-        shutil.rmtree(unpacked.parent, ignore_errors=True)
-        unpacked.mkdir(parents=True)
         try:
-            self._unpack(name, way, unpacked)
+            self._unpack(name, way, folder)
         except unpack.SpaceError:
             raise
         except UnpackError:
@@ -246,34 +283,65 @@ class Fetcher:
             raise
         for archive, size in sizes.items():
             self.records.add(archive, self.checked[archive], size)
-        target = self.folder(name)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        unpacked.rename(target)
+
+    def _make_folder(self, name: str, way: list[Piece]) -> None:
+        """Makes a data set's folder from the pieces of a way, whole or not at all."""
+        with self._place_to_unpack(name) as unpacked:  # first: where nothing can be written, nothing is downloaded
+            self._get_and_unpack(name, way, unpacked)
+            target = self.folder(name)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            unpacked.rename(target)
+
+    def _require_place(self, name: str) -> None:
+        """@throws FetchError if something else is where a data set's folder, or one around it, has to be."""
+        folder = self.folder(name)
+        if os.path.lexists(folder):
+            raise FetchError(f"{folder} is there without {self.lacks(name)}: move it away, then fetch again")
+        for around in folder.parents:
+            if os.path.lexists(around) and not around.is_dir():
+                raise FetchError(f"{around} is not a folder")
 
     def make(self, name: str) -> None:
         """@throws FetchError if a data set cannot be had in any way."""
-        source = self.catalog.datasets[name]
-        if self.folder(name).exists():
-            raise FetchError(
-                f"{self.folder(name)} is there without all of {', '.join(source.holds)}: move it away, then fetch again"
-            )
+        self._require_place(name)
         reasons = []
-        for way in source.ways:
+        for way in self.catalog.datasets[name].ways:
             try:
                 self._make_folder(name, way)
                 return
+            except unpack.SpaceError as error:  # another way takes space too
+                raise FetchError(str(error)) from error
             except (FetchError, UnpackError, OSError) as error:
                 reasons.append(str(error))
-        raise FetchError("; or else: ".join(reasons))
+        raise FetchError("; or else: ".join(dict.fromkeys(reasons)))
 
-    def clean(self, names: list[str]) -> None:
-        """Removes what was left of unpacking, and the archives of complete data sets."""
-        shutil.rmtree(self.work / "unpacking", ignore_errors=True)
-        wanted = {a for n in names if not self.is_there(n) for a in self.catalog.datasets[n].archives}
-        for name in names:
-            for archive in set(self.catalog.datasets[name].archives) - wanted:
+    def waiting(self) -> dict[str, list[str]]:
+        """The data sets that are not there and could come from an archive, by archive."""
+        waiting: dict[str, list[str]] = {}
+        for name, source in self.catalog.datasets.items():
+            for archive in source.archives:
+                names = waiting.setdefault(archive, [])
+                if not self.is_there(name):
+                    names.append(name)
+        return waiting
+
+    def clean(self) -> None:
+        """Removes what a kill left of unpacking, and downloaded archives that no data set waits for."""
+        for around in {parent for source in self.catalog.datasets.values() for parent in Path(source.folder).parents}:
+            shutil.rmtree(self.into / around / UNPACKING, ignore_errors=True)
+        for archive, names in self.waiting().items():
+            if not names:
                 (self.work / archive).unlink(missing_ok=True)
                 download.drop(self.work / f"{archive}.part")
+
+    def kept_lines(self) -> list[str]:
+        """A line on each downloaded archive, or part of one, that lies in the folder."""
+        lines = []
+        for archive, names in self.waiting().items():
+            for file in (self.work / archive, self.work / f"{archive}.part"):
+                if file.exists():
+                    lines.append(f"  {file}: {gigabytes(download.arrived(file))}, for {', '.join(names)}")
+        return lines
 
 
 def take(folder: Path) -> int:
@@ -288,19 +356,19 @@ def take(folder: Path) -> int:
 
 def hand_line(source: Source, fetcher: Fetcher) -> str:
     """What a user has to do for a data set."""
-    archives = " and ".join(source.archives)
+    archives = " and ".join(a for a in source.archives if not fetcher.catalog.archives[a].urls)
     place = f"put {archives} into {fetcher.into} and fetch again" if archives else ""
     unpack_line = f"unpack to {fetcher.into / source.folder}"
     return f"by hand: {source.by_hand}; then {place or unpack_line}"
 
 
-def fetch_one(fetcher: Fetcher, name: str, accepted: bool) -> str:
-    """Fetches a data set; what came of it. @throws FetchError if it is not there afterwards."""
+def fetch_one(fetcher: Fetcher, name: str) -> str:
+    """Fetches a data set into a folder that was taken; what came of it. @throws FetchError if it is not there then."""
     if fetcher.is_there(name):
         return f"at hand: {fetcher.folder(name)}"
     if fetcher.is_by_hand(name):
         raise FetchError(hand_line(fetcher.catalog.datasets[name], fetcher))
-    if not accepted:
+    if fetcher.lock is None:
         raise FetchError("NOT FETCHED: accept its licence, above, with --accept-licences")
     try:
         fetcher.make(name)
@@ -309,15 +377,24 @@ def fetch_one(fetcher: Fetcher, name: str, accepted: bool) -> str:
     return f"done: {fetcher.folder(name)}"
 
 
-def fetch(fetcher: Fetcher, names: list[str], accepted: bool) -> int:
-    """Fetches data sets and ends with a line on each; the exit code."""
+def say_kept(fetcher: Fetcher) -> None:
+    """Says which archives take space."""
+    if lines := fetcher.kept_lines():
+        say("== archives kept, not to download them again; delete what you want no more of")
+        say("\n".join(lines))
+
+
+def fetch(fetcher: Fetcher, names: list[str]) -> int:
+    """Fetches data sets and ends with a line on each; the exit code. A folder that was not taken is left alone."""
     lines, code = {}, 0
     for name in names:
         try:
-            lines[name] = fetch_one(fetcher, name, accepted)
+            lines[name] = fetch_one(fetcher, name)
         except FetchError as error:
             lines[name], code = str(error), 1
-    fetcher.clean(names)
+    if fetcher.lock is not None:
+        fetcher.clean()
+        say_kept(fetcher)
     say("== data sets fetched")
     for name, line in lines.items():
         say(f"  {name:22} {line}")
@@ -342,25 +419,27 @@ def licence_lines(catalog: Catalog, names: list[str]) -> list[str]:
 
 def require_space(fetcher: Fetcher, names: list[str]) -> None:
     """Says how much space fetching takes, and refuses to begin with less."""
-    needed, free = fetcher.needed_bytes(names), shutil.disk_usage(fetcher.into).free
-    say(f"  needs about {gigabytes(needed)}; {gigabytes(free)} are free in {fetcher.into}")
-    if needed > free:
-        raise FetchError(f"too little space in {fetcher.into}: {gigabytes(needed)} needed, {gigabytes(free)} free")
+    for folder, needed in fetcher.needed_bytes(names).items():
+        free = shutil.disk_usage(folder).free
+        say(f"  needs about {gigabytes(needed)}; {gigabytes(free)} are free in {folder}")
+        if needed > free:
+            say_kept(fetcher)
+            raise FetchError(f"too little space in {folder}: {gigabytes(needed)} needed, {gigabytes(free)} free")
 
 
 def run(catalog: Catalog, names: list[str], into: Path, accepted: bool, patience: Patience) -> int:
     """Shows licences, looks for space and fetches data sets; the exit code. Writes nothing that was not accepted."""
     fetcher = Fetcher(catalog, into, patience)
-    absent = [name for name in names if not fetcher.is_there(name)]
-    wanted = [name for name in absent if not fetcher.is_by_hand(name)]
+    wanted = [name for name in names if not (fetcher.is_there(name) or fetcher.is_by_hand(name))]
     if wanted:
         say("== licences")
         say("\n".join(licence_lines(catalog, wanted)))
     if wanted and accepted:
         say("== fetching")
         fetcher.lock = take(into)
+        fetcher.clean()
         require_space(fetcher, wanted)
-    return fetch(fetcher, names, accepted)
+    return fetch(fetcher, names)
 
 
 # ---- Command line
@@ -394,20 +473,23 @@ def parse_arguments(arguments: list[str] | None) -> argparse.Namespace:
     parser.add_argument("names", nargs="*", metavar="NAME", help="data sets or groups of them (see --list)")
     parser.add_argument("--for", nargs="+", dest="experiments", default=[], metavar="EXPERIMENT",
                         help="also those that experiments of the paper use")  # fmt: skip
-    parser.add_argument("--into", type=Path, metavar="DIR", help="folder for all data sets, as --data takes it")
+    parser.add_argument("--into", metavar="DIR", help="folder for all data sets, as --data takes it")
     parser.add_argument("--list", action="store_true", help="list data sets, licences and groups, and stop")
     parser.add_argument("--accept-licences", action="store_true", help="of what is downloaded; without it: nothing")
-    parser.add_argument("--jobs", type=int, default=Patience.connections, help="connections per archive")
+    parser.add_argument("--jobs", type=int, default=Patience.connections, help="connections per archive, at most 16")
     parser.add_argument("--catalog", type=Path, default=catalogs.CATALOG, help="another catalogue")
-    parser.add_argument("--timeout", type=int, default=Patience.timeout_s, help="s without data until a new attempt")
+    parser.add_argument("--timeout", type=int, default=Patience.timeout_s,
+                        help="s without data until a new attempt, at most 600")  # fmt: skip
     parser.add_argument("--attempts", type=int, default=Patience.attempts, help="in a row that bring nothing new")
     parser.add_argument("--pause", type=float, default=Patience.pause_s, help="s after an attempt; doubles")
     parsed = parser.parse_args(arguments)
     if not parsed.list and not (parsed.into and (parsed.names or parsed.experiments)):
         parser.error("needs data sets and --into DIR, or --list")
-    for option in ("jobs", "timeout", "attempts"):
-        if getattr(parsed, option) < 1:
-            parser.error(f"--{option} needs a positive number, not {getattr(parsed, option)}")
+    if parsed.into and os.path.lexists(parsed.into) and not os.path.isdir(parsed.into):
+        parser.error(f"--into needs a folder, which {parsed.into} is not")
+    for option, (least, most) in LIMITS.items():
+        if not least <= (value := getattr(parsed, option)) <= most:
+            parser.error(f"--{option} needs a number from {least} to {most}, not {value}")
     return parsed
 
 
@@ -419,12 +501,12 @@ def main(arguments: list[str] | None = None) -> int:
     except ConfigError as error:
         print(f"Error: {error}", file=sys.stderr)
         return 2
-    if parsed.list:
-        list_datasets(catalog, names)
-        return 0
     patience = Patience(parsed.jobs, parsed.timeout, parsed.attempts, parsed.pause)
     try:
-        return run(catalog, names, parsed.into.resolve(), parsed.accept_licences, patience)
+        if parsed.list:
+            list_datasets(catalog, names)
+            return 0
+        return run(catalog, names, Path(parsed.into).absolute(), parsed.accept_licences, patience)
     except (FetchError, ConfigError, OSError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1

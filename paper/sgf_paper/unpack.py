@@ -253,6 +253,8 @@ def unpack(archive: Path, piece: Piece, folder: Path) -> None:
     extract(archive, taken, [target.joinpath(*member.parts[len(root) :]) for member in taken])
 
 
-def is_complete(folder: Path, holds: list[str]) -> bool:
-    """Whether a data set's folder is there with what it has to hold."""
-    return folder.is_dir() and all(os.path.exists(folder / name) for name in holds)
+def lacks(folder: Path, holds: list[str]) -> str:
+    """The first that a data set's folder lacks of what it has to hold, or of any files; empty if it is complete."""
+    if holds:
+        return next((name for name in holds if not os.path.exists(folder / name)), "")
+    return "" if folder.is_dir() and any(folder.iterdir()) else "files"

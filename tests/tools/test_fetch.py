@@ -8,10 +8,13 @@ import os
 import random
 import signal
 import subprocess
+import sys
 import tarfile
+import tempfile
 import threading
 import time
 import zipfile
+from pathlib import Path
 
 import pytest
 import yaml
@@ -188,6 +191,15 @@ def world(tmp_path, server):
     return World(tmp_path, server)
 
 
+@pytest.fixture
+def shared(world):
+    """The data sets `toy` and `tests` of one archive."""
+    toy = world.node["datasets"]["toy"]
+    way = [{"archive": "toy.zip", "take": "test"}]
+    world.node["datasets"]["tests"] = {**toy, "folder": "tests", "holds": ["x.png"], "ways": [way]}
+    return world
+
+
 def last_line(output):
     return output.splitlines()[-1].strip()
 
@@ -236,15 +248,11 @@ def test_a_tar_archive_in_pieces_and_an_archive_within_an_archive(world):
     assert (world.into / "flight/mav0/x").read_bytes() == b"x"
 
 
-def test_data_sets_that_share_an_archive_download_it_once(world):
-    toy = world.node["datasets"]["toy"]
-    world.node["datasets"]["tests"] = {
-        **toy, "folder": "tests", "holds": ["x.png"], "ways": [[{"archive": "toy.zip", "take": "test"}]],
-    }  # fmt: skip
-    world.server.manners["toy.zip"] = "no ranges"
-    code, output = world.fetch("toy", "tests")
-    assert code == 0 and world.is_right() and (world.into / "tests" / "x.png").exists(), output
-    assert output.count("from http") == 1 and world.left_over() == []
+def test_data_sets_that_share_an_archive_download_it_once(shared):
+    shared.server.manners["toy.zip"] = "no ranges"
+    code, output = shared.fetch("toy", "tests")
+    assert code == 0 and shared.is_right() and (shared.into / "tests" / "x.png").exists(), output
+    assert output.count("from http") == 1 and shared.left_over() == []
 
 
 def test_the_list_needs_no_folder_and_no_network(world, server):
@@ -258,6 +266,32 @@ def test_the_list_needs_no_folder_and_no_network(world, server):
 def test_what_is_downloaded_for_experiments(tmp_path):
     done = subprocess.run([PROGRAM, "--for", "fig1", "--into", tmp_path], capture_output=True, text=True)
     assert done.returncode == 1 and "icl_nuim_lr_kt2" in done.stdout and "euroc" not in done.stdout
+
+
+def test_without_pyyaml_its_package_is_named():
+    done = subprocess.run([sys.executable, "-S", PROGRAM, "--list"], capture_output=True, text=True)
+    assert done.returncode == 1 and done.stdout == ""
+    assert done.stderr == "Error: PyYAML is not installed (Debian package python3-yaml)\n"
+
+
+def test_a_reader_that_goes_away_ends_it_silently():
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run([PROGRAM, "--list"], stdout=writer, stderr=subprocess.PIPE)
+    os.close(writer)
+    assert done.returncode == -signal.SIGPIPE and done.stderr == b""
+
+
+def test_a_closed_output_does_not_keep_it_from_its_work(by_hand):
+    command = ["sh", "-c", '"$@" >&-', "sh", *by_hand.command("toy")]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 1 and done.stderr == ""
+
+
+def test_a_folder_may_have_any_name(world):
+    world.into = world.root / os.fsdecode(b"d\xe4ta")
+    code, output = world.fetch()
+    assert code == 0 and world.is_right() and r"d\udce4ta/toys/train" in last_line(output), output
 
 
 # ---- Licences, wrong usage
@@ -279,7 +313,15 @@ def test_without_accepted_licences_they_are_shown_and_nothing_is_downloaded(worl
         (["--into", "x"], "needs data sets and --into DIR"),
         (["toys", "--into", "x"], "unknown data set 'toys'; known: "),
         (["--for", "table9", "--into", "x"], "table9.yaml: cannot be read"),
-        (["kitti2015", "--into", "x", "--jobs", "0"], "--jobs needs a positive number, not 0"),
+        (["kitti2015", "--into", ""], "needs data sets and --into DIR"),
+        (["kitti2015", "--into", "/dev/null"], "--into needs a folder, which /dev/null is not"),
+        (["kitti2015", "--into", "x", "--jobs", "0"], "--jobs needs a number from 1 to 16, not 0"),
+        (["kitti2015", "--into", "x", "--jobs", "17"], "--jobs needs a number from 1 to 16, not 17"),
+        (["kitti2015", "--into", "x", "--timeout", "601"], "--timeout needs a number from 1 to 600, not 601"),
+        (["kitti2015", "--into", "x", "--attempts", "2000"], "--attempts needs a number from 1 to 100, not 2000"),
+        (["kitti2015", "--into", "x", "--pause", "-1"], "--pause needs a number from 0 to 3600, not -1.0"),
+        (["kitti2015", "--into", "x", "--pause", "nan"], "--pause needs a number from 0 to 3600, not nan"),
+        (["kitti2015", "--into", "x", "--pause", "inf"], "--pause needs a number from 0 to 3600, not inf"),
         (["kitti2015", "--into", "x", "--fast"], "unrecognized arguments: --fast"),
     ],
 )
@@ -321,6 +363,38 @@ def test_a_wrong_archive_that_the_user_put_there_is_named_and_kept(by_hand):
     code, output = by_hand.fetch()
     assert code == 1 and f"{by_hand.into}/toy.zip: toy.zip is neither" in output
     assert (by_hand.into / "toy.zip").exists()
+
+
+def test_a_wrong_archive_is_read_once_for_all_that_comes_from_it(by_hand, monkeypatch):
+    by_hand.into.mkdir()
+    (by_hand.into / "toy.zip").write_bytes(HTML)
+    by_hand.command()
+    read = []
+    checksums = fetch.checksums_of
+    monkeypatch.setattr(fetch, "checksums_of", lambda file: read.append(file.name) or checksums(file))
+    fetcher = fetch.Fetcher(catalog.load_catalog(by_hand.root / "catalog.yaml"), by_hand.into, Patience())
+    for _ in range(2):
+        with pytest.raises(fetch.FetchError, match=f"{by_hand.into}/toy.zip: toy.zip is neither"):
+            fetcher.get_archive("toy.zip")
+    assert read == ["toy.zip"]
+
+
+def test_an_empty_folder_is_not_at_hand(by_hand):
+    del by_hand.node["datasets"]["toy"]["ways"], by_hand.node["datasets"]["toy"]["holds"]
+    (by_hand.into / "toys" / "train").mkdir(parents=True)
+    code, output = by_hand.fetch()
+    assert code == 1 and f"then unpack to {by_hand.into}/toys/train" in last_line(output)
+    (by_hand.into / "toys" / "train" / "a").mkdir()
+    code, output = by_hand.fetch()
+    assert code == 0 and "at hand: " in last_line(output)
+
+
+def test_what_comes_in_part_by_hand_is_not_begun_without_that_part(by_hand):
+    by_hand.node["archives"]["net.zip"] = {"urls": [f"{by_hand.server.address}/net.zip"]}
+    by_hand.node["datasets"]["toy"]["ways"][0].insert(0, {"archive": "net.zip"})
+    code, output = by_hand.fetch()
+    assert code == 1 and "by hand: log in at https://example.org/login" in last_line(output)
+    assert f"then put toy.zip into {by_hand.into}" in last_line(output) and by_hand.server.requests == []
 
 
 # ---- Servers that fail
@@ -597,17 +671,121 @@ def test_a_redirect_is_followed_but_not_to_a_file(world):
 
 def test_with_too_little_space_nothing_is_begun(world):
     world.archive["about_bytes"] = 10**15
+    part = world.into / ".sgf-fetch" / "toy.zip.part"
+    part.parent.mkdir(parents=True)
+    part.write_bytes(bytes(10_000_000))
     code, output = world.fetch()
     assert code == 1 and world.server.requests == []
-    assert f"too little space in {world.into}: 1000000.00 GB needed" in output
+    assert f"too little space in {world.into}: 999999.99 GB needed" in output
+    assert f"{part}: 0.01 GB, for toy" in output, "what could be deleted"
+
+
+def raise_that_space_is_short(folder, needed, what):
+    raise fetch.unpack.SpaceError(f"{what} needs more")
+
+
+def test_when_space_runs_out_no_other_way_is_downloaded(world, monkeypatch, capsys):
+    world.node["archives"]["own.zip"] = {"urls": [f"{world.server.address}/own.zip"]}
+    world.node["datasets"]["toy"]["ways"].append([{"archive": "own.zip", "take": "train"}])
+    world.command()
+    monkeypatch.setattr(fetch.unpack, "require_space", raise_that_space_is_short)
+    read = catalog.load_catalog(world.root / "catalog.yaml")
+    assert fetch.run(read, ["toy"], world.into, True, Patience()) == 1
+    assert "FAILED: unpacking toy.zip needs more" in last_line(capsys.readouterr().out)
+    assert {name for name, _ in world.server.requests} == {"toy.zip"} and world.left_over() == ["toy.zip"]
 
 
 def test_a_folder_that_is_there_but_not_complete_is_left_alone(world):
     (world.into / "toys" / "train" / "mine").mkdir(parents=True)
     code, output = world.fetch()
     assert code == 1 and world.server.requests == []
-    assert f"{world.into}/toys/train is there without all of a/im0.png" in last_line(output)
+    assert f"{world.into}/toys/train is there without a/im0.png" in last_line(output)
     assert (world.into / "toys" / "train" / "mine").is_dir()
+
+
+@pytest.mark.parametrize("other", ["file", "link that leads nowhere"])
+@pytest.mark.parametrize("place", ["toys", "toys/train"])
+def test_something_else_in_the_place_of_a_folder_is_found_before_the_download(world, place, other):
+    path = world.into / place
+    path.parent.mkdir(parents=True)
+    path.write_text("mine") if other == "file" else path.symlink_to("nowhere")
+    code, output = world.fetch()
+    assert code == 1 and world.server.requests == []
+    assert f"{path} is {'not a folder' if place == 'toys' else 'there without a/im0.png'}" in last_line(output)
+    assert os.path.lexists(path) and [entry.name for entry in path.parent.iterdir()].count(path.name) == 1
+
+
+def test_a_folder_that_cannot_be_written_is_found_before_the_download(world):
+    world.into.mkdir()
+    (world.into / "toys").symlink_to("/proc")
+    code, output = world.fetch()
+    assert code == 1 and world.server.requests == []
+    assert "FAILED" in last_line(output) and f"{world.into}/toys/.sgf-unpacking" in last_line(output)
+
+
+@pytest.fixture
+def other_disk(tmp_path):
+    """A folder on another file system."""
+    shared_memory = Path("/dev/shm")
+    if not shared_memory.is_dir() or shared_memory.stat().st_dev == tmp_path.stat().st_dev:
+        pytest.skip("there is no second file system")
+    with tempfile.TemporaryDirectory(dir=shared_memory) as folder:
+        yield Path(folder)
+
+
+def test_the_data_may_lie_on_another_disk(world, other_disk):
+    world.node["datasets"]["toy"]["unpacked_bytes"] = 20_000_000
+    world.into.mkdir()
+    (world.into / "toys").symlink_to(other_disk)
+    code, output = world.fetch()
+    assert code == 0 and world.is_right() and world.left_over() == [], output
+    assert [path.name for path in other_disk.iterdir()] == ["train"]
+    needed = [line.split(";")[0].strip() for line in output.splitlines() if "are free in" in line]
+    assert needed == ["needs about 0.00 GB", "needs about 0.02 GB"]
+
+
+def test_the_downloads_may_lie_on_another_disk(world, other_disk):
+    world.into.mkdir()
+    (world.into / ".sgf-fetch").symlink_to(other_disk)
+    code, output = world.fetch()
+    assert code == 0 and world.is_right() and world.left_over() == [], output
+
+
+def test_an_archive_is_kept_until_all_that_comes_from_it_is_there(shared):
+    code, output = shared.fetch()
+    assert code == 0 and shared.left_over() == ["toy.zip"]
+    assert f"{shared.into}/.sgf-fetch/toy.zip: 0.00 GB, for tests" in output and "== archives kept" in output
+    shared.server.requests.clear()
+    code, output = shared.fetch("tests")
+    assert code == 0 and shared.left_over() == [] and "== archives kept" not in output, output
+    assert shared.server.requests == []
+
+
+def test_what_a_kill_left_of_complete_data_sets_goes_with_the_next_fetch(shared):
+    shared.fetch()
+    shared.fetch("tests")
+    (shared.into / ".sgf-fetch" / "toy.zip").write_bytes(shared.toy)
+    other = {**shared.node["datasets"]["toy"], "folder": "other", "ways": [[{"archive": "none.zip"}]]}
+    shared.node["datasets"]["other"] = other
+    shared.node["archives"]["none.zip"] = {"urls": [f"{shared.server.address}/none.zip"]}
+    assert shared.fetch("other")[0] == 1 and shared.left_over() == []
+
+
+@pytest.mark.parametrize("name, accept, code", [("toy", True, 0), ("toy", False, 0), ("tests", False, 1)])
+def test_what_another_fetch_works_on_is_left_alone(shared, name, accept, code):
+    shared.fetch()
+    work = shared.into / ".sgf-fetch"
+    unpacked = shared.into / ".sgf-unpacking" / "tests" / "x.png"
+    unpacked.parent.mkdir(parents=True)
+    for file in (unpacked, work / "toy.zip", work / "toy.zip.part", work / "toy.zip.part.aria2"):
+        file.touch()
+    before = sorted(shared.into.rglob("*"))
+    lock = fetch.take(shared.into)
+    try:
+        assert shared.fetch(name, accept=accept)[0] == code
+    finally:
+        os.close(lock)
+    assert sorted(shared.into.rglob("*")) == before
 
 
 def test_two_at_once_do_not_share_a_folder(world, monkeypatch):
@@ -632,6 +810,7 @@ def test_a_kill_while_unpacking_leaves_no_half_of_a_data_set(world, monkeypatch)
     code, output = world.fetch()
     assert code == 0 and world.is_right() and world.left_over() == [], output
     assert world.server.requests == [], "what was downloaded is not downloaded again"
+    assert sorted(path.name for path in world.into.iterdir()) == [".sgf-fetch", "toys"]
 
 
 def test_without_aria2_its_package_is_named(world, monkeypatch):

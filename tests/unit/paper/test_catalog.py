@@ -59,8 +59,17 @@ def test_entries_and_groups(tmp_path):
         (("archives",), ["a.zip"], "archives: expected dict[str, Any], found ['a.zip']"),
         (("archives", 7), {}, "archives: expected dict[str, Any]"),
         (("archives", "../a.zip"), {}, "'../a.zip' is not a plain file name"),
+        (("archives", "lock"), {}, "archives.lock: the name ends in none of .zip, .tar"),
+        (("archives", "a" * 200 + ".zip"), {}, "is longer than 200 bytes"),
+        (("archives", "a.zip", "sha256"), "A" * 64, "hexadecimal digits in lower case"),
         (("datasets", "a", "folder"), "../a", "'../a' leads out"),
         (("datasets", "a", "folder"), "/a", "'/a' leads out"),
+        (("datasets", "a", "folder"), "", "datasets.a: folder '' is not a plain one below the data folder"),
+        (("datasets", "a", "folder"), "./", "folder './' is not a plain one"),
+        (("datasets", "a", "folder"), ".sgf-fetch", "folder '.sgf-fetch' is not a plain one"),
+        (("datasets", "a", "folder"), "us/" + "ä" * 101, "is longer than 200 bytes"),
+        (("datasets", "a", "folder"), "us/b/", "datasets.b: its folder is, or lies in, that of 'a'"),
+        (("datasets", "a", "folder"), "us", "datasets.b: its folder is, or lies in, that of 'a'"),
         (("datasets", "a", "holds"), ["x/../../y"], "leads out"),
         (("datasets", "a", "folder"), "a\0b", "leads out"),
         (("datasets", "a", "holds"), ["x", 1], "datasets.a.holds: expected list[str]"),
@@ -75,7 +84,9 @@ def test_entries_and_groups(tmp_path):
         (("datasets", "a", "ways"), [[{"archive": "hand.zip"}]], "'hand.zip' has no urls"),
         (("datasets", "a", "ways"), [[{"archive": "a.zip", "to": "/etc"}]], "'/etc' leads out"),
         (("datasets", "a", "ways"), [], "has neither ways nor by_hand"),
+        (("datasets", "b", "ways"), [[]], "datasets.b.ways: one has no pieces"),
         (("groups", "both"), ["a", "c"], "groups.both: no data set 'c'"),
+        (("groups", "both"), [], "groups.both: names no data set"),
         (("groups", "both"), "a", "groups: expected dict[str, list[str]]"),
         (("groups", "a"), ["b"], "a data set has this name"),
         (("extra",), {}, "expected archives, publishers"),
@@ -91,6 +102,12 @@ def test_what_is_wrong_is_named_with_its_file(tmp_path, keys, value, message):
 def test_an_unknown_name_is_said_with_those_that_are_known(tmp_path):
     with pytest.raises(ConfigError, match="unknown data set 'c'; known: both, a, b"):
         load(tmp_path).expand(["a", "c"])
+
+
+def test_an_experiment_may_hold_long_texts(tmp_path, experiments):
+    (experiments / "first.yaml").write_text(f"title: {'a' * 300}\nlike: second\n")
+    (experiments / "second.yaml").write_text("like: first\nfile: us/a/x.png\n")
+    assert catalog.needed_by(["first"], load(tmp_path)) == ["a"]
 
 
 # ---- The project's own catalogue

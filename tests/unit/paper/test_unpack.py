@@ -266,6 +266,16 @@ def test_what_is_no_archive_is_said_with_its_beginning(tmp_path, folder):
         unpack.unpack(tmp_path / "page.zip", Piece("page.zip"), folder)
 
 
+def test_a_folder_lacks_what_it_has_to_hold_or_any_files(tmp_path):
+    folder = tmp_path / "set"
+    assert unpack.lacks(folder, []) == "files" and unpack.lacks(folder, ["a", "b"]) == "a"
+    folder.mkdir()
+    assert unpack.lacks(folder, []) == "files"
+    (folder / "a").touch()
+    assert unpack.lacks(folder, []) == "" and unpack.lacks(folder, ["a", "b"]) == "b"
+    assert unpack.lacks(folder / "a", []) == "files", "a file is no folder"
+
+
 def test_too_little_space_is_noticed_before_anything_is_written(tmp_path, folder, monkeypatch):
     usage = type("Usage", (), {"free": 2})
     monkeypatch.setattr(unpack.shutil, "disk_usage", lambda path: usage)
