@@ -101,7 +101,8 @@ double VisualEquations::LinearizeItem(std::span<const PoseState> poses, Landmark
   const auto across = [&](int frame) -> auto& {
     for (auto& a : item.across)
       if (a.frame == frame) return a.H;
-    return item.across.emplace_back(frame, Eigen::Matrix<double, 3, kPoseParameters>::Zero()).H;
+    item.across.push_back({frame, Eigen::Matrix<double, 3, kPoseParameters>::Zero()});
+    return item.across.back().H;
   };
   across(item.host);
   double cost = 0;
