@@ -1,4 +1,4 @@
-"""sgf_stereo and sgf_eval from the command line, and the installed package."""
+"""sgf_stereo and sgf_eval from the command line."""
 
 import json
 import os
@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-HERE = Path(__file__).resolve().parent
 BUILD = Path(os.environ["SGF_BUILD_DIR"])
 SHIFT = 6
 SIZE = (60, 100)  # rows, columns
@@ -439,15 +438,3 @@ def test_a_change_is_made_to_the_right_images(sweep, tmp_path):
     assert "exposure: 0.001" in options.read_text()
     result = run("sgf_eval", *sweep, "--column", "sgf", "--change", "dark")
     assert result.returncode == 2 and "--changes" in result.stderr
-
-
-def test_another_project_links_the_installed_package(tmp_path):
-    def cmake(*arguments):
-        subprocess.run(["cmake", *map(str, arguments)], check=True, capture_output=True, timeout=300)
-
-    cmake("--install", BUILD, "--prefix", tmp_path / "prefix")
-    cmake("-S", HERE / "consumer", "-B", tmp_path / "build", "-G", "Ninja",
-          f"-DCMAKE_PREFIX_PATH={tmp_path / 'prefix'}")
-    cmake("--build", tmp_path / "build")
-    result = subprocess.run([tmp_path / "build" / "consumer"], capture_output=True, text=True, check=True)
-    assert result.stdout == "disparity 7\n"
