@@ -35,7 +35,7 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${CMAKE_LIBRARY_OUTPUT_DIRECTOR
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY =)
 
-# The packages in which find_package(sgf) finds what sgf-config.cmake.in names.
+# The packages in which find_package(sgf) finds what the libraries need.
 sgf_package(libsgf-dev SECTION libdevel
   SUMMARY "gradient-based dissimilarities for stereo and visual odometry (development)"
   DESCRIPTION "Headers, static libraries, CMake package and examples of SGF, a dissimilarity

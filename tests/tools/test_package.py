@@ -48,9 +48,42 @@ def path_of(trajectory):
     return poses - poses[0]
 
 
-def test_a_program_that_swaps_the_matcher(prefix, tmp_path):
-    folder = build(HERE / "consumer", prefix, tmp_path)
+def without(*packages):
+    return [f"-DCMAKE_DISABLE_FIND_PACKAGE_{package}=ON" for package in packages]
+
+
+def test_a_program_that_swaps_the_matcher_needs_what_matching_needs(prefix, tmp_path):
+    folder = build(HERE / "consumer", prefix, tmp_path, *without("Ceres", "embree", "OpenEXR", "OpenSSL"))
     assert output_of(folder / "consumer") == "disparity 7\n"
+
+
+@pytest.mark.parametrize(
+    "asked, missing, told",
+    [
+        ("REQUIRED", [], "found: core metrics stereo io eval synth alignment odometry direct flow vio"),
+        ("REQUIRED", ["embree"], "sgf::synth needs embree"),
+        ("REQUIRED COMPONENTS flow odometry", ["Ceres"], "found: core metrics stereo alignment odometry flow"),
+        ("REQUIRED COMPONENTS vio", ["Ceres"], "sgf::vio needs Ceres::ceres"),
+        ("REQUIRED COMPONENTS eval synth", ["OpenSSL"], "sgf::io needs OpenSSL::Crypto"),
+        ("REQUIRED COMPONENTS eval OPTIONAL_COMPONENTS vio", ["Ceres"], "found: core eval"),
+        ("REQUIRED COMPONENTS stero", [], "There is no sgf::stero"),
+    ],
+)
+def test_components(prefix, tmp_path, asked, missing, told):
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(asks LANGUAGES CXX)\nset(OpenCV_LIBS mine)\n"
+        f"find_package(sgf {asked})\n"
+        "foreach(name core metrics stereo io eval synth alignment odometry direct flow vio)\n"
+        '  if(TARGET sgf::${name} AND sgf_${name}_FOUND)\n    string(APPEND found " ${name}")\n  endif()\n'
+        'endforeach()\nmessage(STATUS "found:${found}; OpenCV_LIBS: ${OpenCV_LIBS}")\n'
+    )
+    flags = ["-G", "Ninja", f"-DCMAKE_PREFIX_PATH={prefix}", *without(*missing)]
+    result = run("cmake", "-S", tmp_path, "-B", tmp_path / "build", *flags)
+    assert (result.returncode == 0) == told.startswith("found")
+    if told.startswith("found"):
+        assert f"-- {told}; OpenCV_LIBS: mine\n" in result.stdout
+    else:
+        assert told in " ".join(result.stderr.split())
 
 
 def test_the_matcher_writes_disparities(examples, pair, tmp_path):  # noqa: F811
