@@ -24,6 +24,8 @@ namespace sgf {
 /// | their borders               | without disparities          | matched                      |
 /// | threads                     | cv::setNumThreads()          | setThreads(); all if not set |
 /// | bad input                   | throws cv::Exception         | throws sgf::Error            |
+///
+/// compute() may run in several threads at once, on one object too, while no parameter is set.
 class StereoSgf : public cv::StereoMatcher {
  public:
   /// Parameters in the order of cv::StereoBM::create().
@@ -71,6 +73,8 @@ class StereoSgf : public cv::StereoMatcher {
 /// | their borders                 | left without disparities     | matched                       |
 /// | threads                       | one, or by the mode          | setThreads(); two if not set  |
 /// | bad input                     | throws cv::Exception         | throws sgf::Error             |
+///
+/// compute() may run in several threads at once, on one object too, while no parameter is set.
 class StereoSgfSemiGlobal : public cv::StereoMatcher {
  public:
   /// Parameters in the order of cv::StereoSGBM::create(), and with its meanings but for the units
@@ -114,6 +118,7 @@ class StereoSgfSemiGlobal : public cv::StereoMatcher {
 /// Global stereo of MeshStereo's class on the SGF dissimilarity behind OpenCV's interface: every
 /// pixel gets a disparity. Inputs are rectified 8-bit images of equal size, grey or BGR; see
 /// stereo::MeshStereo. It has no speckle filter: those settings read as 0 and stay so.
+/// compute() may run in several threads at once, on one object too, while no parameter is set.
 class StereoSgfMesh : public cv::StereoMatcher {
  public:
   /// @param num_disparities number of integer disparities searched, px; 0 stands for 64.
