@@ -35,12 +35,12 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS "${CMAKE_LIBRARY_OUTPUT_DIRECTOR
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY =)
 
-# The packages in which find_package(sgf) finds what sgf-config.cmake.in names.
+# The packages in which find_package(sgf) finds what the libraries need.
 sgf_package(libsgf-dev SECTION libdevel
   SUMMARY "gradient-based dissimilarities for stereo and visual odometry (development)"
-  DESCRIPTION "Headers, static libraries and CMake package of SGF, a dissimilarity of image
-gradients that does not change when one image gets brighter or gains contrast:
-stereo matchers for OpenCV, direct image alignment and visual odometry."
+  DESCRIPTION "Headers, static libraries, CMake package and examples of SGF, a dissimilarity
+of image gradients that does not change when one image gets brighter or gains
+contrast: stereo matchers for OpenCV, direct image alignment, visual odometry."
   DEPENDS libopencv-dev libeigen3-dev libfmt-dev libyaml-cpp-dev libtbb-dev libhwy-dev libceres-dev libopenexr-dev
           libssl-dev libembree-dev)
 sgf_package(sgf-tools SECTION science

@@ -82,7 +82,7 @@ function(sgf_library name)
   set_target_properties(${target} PROPERTIES
     OUTPUT_NAME sgf_${name} EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
   sgf_precompile_headers(${target})
-  install(TARGETS ${target} EXPORT sgf-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  install(TARGETS ${target} EXPORT sgf-${name}-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
     COMPONENT libsgf-dev)
   install(DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}/"
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sgf/${name} COMPONENT libsgf-dev

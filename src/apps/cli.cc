@@ -65,13 +65,37 @@ void OptionFlags::Add(CLI::App& app, const OptionDoc& doc,
 
 std::set<std::string> OptionFlags::Given() const {
   std::set<std::string> names;
-  const YAML::Node config = config_.empty() ? YAML::Node() : LoadConfig();
-  for (const YAML::Node& map : {config, flags_})
+  for (const YAML::Node& map : {LoadConfig().options, flags_})
     if (map.IsMap())
       for (const auto& entry : map) names.insert(entry.first.Scalar());
   return names;
 }
 
-YAML::Node OptionFlags::LoadConfig() const { return LoadYamlFile(config_); }
+namespace {
+
+// The options.yaml of a run, in the form that options have.
+struct RunFile {
+  YAML::Node options, build;
+  std::map<std::string, YAML::Node> choices;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("options", options, "", "");
+    visit("build", build, "", "");
+    for (auto& [name, choice] : choices) visit(name.c_str(), choice, "", "");
+  }
+};
+
+}  // namespace
+
+OptionFlags::Config OptionFlags::LoadConfig() const {
+  if (config_.empty()) return {};
+  const YAML::Node file = LoadYamlFile(config_);
+  if (!file.IsMap() || !file["options"]) return {file, {}};
+  RunFile run;
+  for (const std::string& name : choices_) run.choices[name];
+  ReadOptions(file, run, config_);
+  return {run.options, run.choices};
+}
 
 }  // namespace sgf::apps

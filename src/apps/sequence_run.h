@@ -99,7 +99,8 @@ class ReportClock {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-/// Writes options.yaml: all options of a run, as written by WriteOptions(), and the build.
+/// Writes options.yaml: all options of a run, as written by WriteOptions(), and the build. --config
+/// takes the file (OptionFlags).
 void WriteRunOptions(const std::filesystem::path& file, const YAML::Node& options);
 
 }  // namespace sgf::apps

@@ -129,12 +129,14 @@ void WriteDisparity(const fs::path& folder, const cv::Mat1f& disparity, const Se
   WritePng(folder / "colour.png", Colour(disparity, range));
 }
 
+// OpenCV's matchers have parameters that are no options of ours: those of a run are noted beside.
 void WriteRunOptions(const fs::path& folder, const Arguments& arguments,
-                     const YAML::Node& options) {
+                     const StereoOptions& options, const StereoMethod& method) {
   YAML::Node node;
   node["method"] = arguments.method;
   node["fill"] = arguments.fill;
-  node["options"] = options;
+  node["options"] = std::visit([](const auto& o) { return WriteOptions(o); }, options);
+  if (options.index() >= kOwnMethods) node["opencv"] = method.Options();
   node["build"] = DescribeBuild();
   WriteTextFile(folder / "options.yaml", YAML::Dump(node) + "\n");
 }
@@ -154,7 +156,7 @@ void MatchPair(const Arguments& arguments, const StereoOptions& options, const c
   MakeFolder(folder);
   WriteDisparity(folder, disparity, RangeOf(options));
   method->WriteMore(folder);
-  WriteRunOptions(folder, arguments, method->Options());
+  WriteRunOptions(folder, arguments, options, *method);
   if (scores.empty()) return;
   WriteTextFile(folder / "scores.json", scores.dump(2) + "\n");
   for (const auto& [region, s] : scores.items())
@@ -214,6 +216,12 @@ void RequireOutput(const fs::path& folder) {
     throw Error(folder.string(), "is not a folder");
 }
 
+// What the command line does not say is as in the run whose options.yaml --config names.
+void TakeChoices(const CLI::App& app, const OptionFlags& flags, Arguments& arguments) {
+  if (app.count("--method") == 0) flags.ApplyChoice("method", arguments.method);
+  if (app.count("--fill") == 0) flags.ApplyChoice("fill", arguments.fill);
+}
+
 void Run(const Arguments& arguments, const OptionFlags& flags) {
   if (arguments.list_metrics) return ListMetrics();
   if (arguments.inputs.empty() || arguments.inputs.size() > 2)
@@ -265,6 +273,10 @@ int main(int argc, char** argv) {
   app.add_flag("--list-metrics", arguments.list_metrics, "print the table of dissimilarities");
   const apps::OptionFlags flags(
       app, apps::AllOptions{},
-      {{"num_disparities", "--max-disp"}, {"uniqueness_pct", "--uniqueness"}});
-  return apps::RunTool(app, argc, argv, [&] { apps::Run(arguments, flags); });
+      {{"num_disparities", "--max-disp"}, {"uniqueness_pct", "--uniqueness"}},
+      {"method", "fill", "opencv"});
+  return apps::RunTool(app, argc, argv, [&] {
+    apps::TakeChoices(app, flags, arguments);
+    apps::Run(arguments, flags);
+  });
 }

@@ -24,11 +24,8 @@ void CheckOptions(const BlockMatcherOptions& o) {
   CheckCostOptions(o);
   RequireRange("window", o.window, 1, kLargestWindow);
   RequireOdd("window", o.window);
-  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, internal::kLargestUniqueness);
   RequireRange("texture_threshold", o.texture_threshold, 0, 1e6);
-  RequireRange("left_right_max", o.left_right_max, -1, kLargestDisparity);
-  RequireRange("speckle_window", o.speckle_window, 0, 1e9);
-  RequireRange("speckle_range", o.speckle_range, 0, kLargestDisparity);
+  CheckOptions(static_cast<const MatchChecks&>(o));
 }
 
 void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOptions& options) {

@@ -8,32 +8,18 @@
 namespace sgf::stereo {
 
 /// Parameters of BlockMatcher. Where a default has a counterpart in cv::StereoBM, it is named.
-struct BlockMatcherOptions : CostOptions {
+struct BlockMatcherOptions : CostOptions, MatchChecks {
   int window = 9;
-  Subpixel subpixel = Subpixel::kEquiangular;
-  double uniqueness_pct = 10;
   double texture_threshold = 0;
-  int left_right_max = 1;
-  int speckle_window = 0;
-  double speckle_range = 1;
 
   template <class V>
   void VisitFields(V&& visit) {
     CostOptions::VisitFields(visit);
     visit("window", window, "px", "side of the square matching window, odd");
-    visit("subpixel", subpixel, "", "interpolation of the winner's cost");
-    visit(
-        "uniqueness_pct", uniqueness_pct, "%",
-        "a match is dropped unless every candidate other than the winner and its neighbours costs "
-        "more than (1 + this) times the winner; 0 keeps all");
     visit("texture_threshold", texture_threshold, "grey levels/px",
           "a match is dropped where the mean gradient magnitude over the window is below; 0 keeps "
           "all");
-    visit("left_right_max", left_right_max, "px",
-          "largest difference to the disparity found from the right image; -1 turns the check off");
-    visit("speckle_window", speckle_window, "px",
-          "connected regions up to this size are dropped; 0 keeps all");
-    visit("speckle_range", speckle_range, "px", "largest step inside a connected region");
+    MatchChecks::VisitFields(visit);
   }
 };
 
@@ -51,7 +37,8 @@ void CheckPair(const cv::Mat& left, const cv::Mat& right, const BlockMatcherOpti
 /// whose right pixel lies inside the image. Windows are cut at the border of the left image; where
 /// one reaches out of the right image, the right image's border column is repeated.
 ///
-/// Results are the same bits for any number of threads and any instruction set.
+/// Results are the same bits for any number of threads and any instruction set. One matcher may
+/// serve several threads at once.
 class BlockMatcher {
  public:
   /// @throws Error for an option out of range, with its name and value.

@@ -18,6 +18,17 @@ std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel) {
   return kNames;
 }
 
+namespace {
+constexpr int kLargestUniqueness = 99;  // percent; less than the winner itself
+}
+
+void CheckOptions(const MatchChecks& o) {
+  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, kLargestUniqueness);
+  RequireRange("left_right_max", o.left_right_max, -1, kLargestDisparity);
+  RequireRange("speckle_window", o.speckle_window, 0, 1e9);
+  RequireRange("speckle_range", o.speckle_range, 0, kLargestDisparity);
+}
+
 namespace internal {
 
 int UniquenessQ16(double percent) { return static_cast<int>(std::lround(percent / 100 * 65536)); }

@@ -15,6 +15,33 @@ enum class Subpixel {
 };
 std::span<const std::pair<const char*, Subpixel>> EnumNames(Subpixel);
 
+/// Options of BlockMatcher and SemiGlobal: the sub-pixel disparity of a match, and which matches
+/// are dropped.
+struct MatchChecks {
+  Subpixel subpixel = Subpixel::kEquiangular;
+  double uniqueness_pct = 10;
+  int left_right_max = 1;
+  int speckle_window = 0;
+  double speckle_range = 1;
+
+  template <class V>
+  void VisitFields(V&& visit) {
+    visit("subpixel", subpixel, "", "interpolation of the winner's cost");
+    visit(
+        "uniqueness_pct", uniqueness_pct, "%",
+        "a match is dropped unless every candidate other than the winner and its neighbours costs "
+        "more than (1 + this) times the winner; 0 keeps all");
+    visit("left_right_max", left_right_max, "px",
+          "largest difference to the disparity found from the right image; -1 turns the check off");
+    visit("speckle_window", speckle_window, "px",
+          "connected regions up to this size are dropped; 0 keeps all");
+    visit("speckle_range", speckle_range, "px", "largest step inside a connected region");
+  }
+};
+
+/// @throws Error for an option out of range, with its name and value.
+void CheckOptions(const MatchChecks& options);
+
 /// Disparities of the left image in 1/16 px, as OpenCV's matchers give them, with what the
 /// uniqueness filter needs.
 struct Matches {
@@ -30,8 +57,6 @@ namespace internal {
 constexpr short InvalidDisparity(int min_disparity) {
   return static_cast<short>(16 * (min_disparity - 1));
 }
-
-constexpr int kLargestUniqueness = 99;  ///< percent; less than the winner itself
 
 /// Margin over the winner's cost times 2^16.
 int UniquenessQ16(double percent);

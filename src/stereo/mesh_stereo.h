@@ -97,7 +97,7 @@ struct MeshStereoResult {
 ///
 /// Memory: height * disparities * (width + disparities) bytes for the costs, 2 kB a triangle for
 /// the windows. The same seed gives the same bits for any number of threads and any instruction
-/// set.
+/// set. One matcher may serve several threads at once.
 class MeshStereo {
  public:
   /// @throws Error for an option out of range, with its name and value.

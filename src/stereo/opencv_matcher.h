@@ -6,6 +6,7 @@ namespace sgf::stereo {
 
 /// A matcher of this library behind OpenCV's interface: what cv::StereoMatcher asks for, over the
 /// matcher's options struct. Options that the struct does not have read as 0 and cannot be set.
+/// Each call of compute() makes a matcher of the options that are set then.
 /// @tparam Interface cv::StereoMatcher or an abstract class derived from it.
 /// @tparam Matcher has options(), and Compute(left, right, cv::Mat1s&) in 1/16 px; its constructor
 ///   checks the options.

@@ -16,10 +16,7 @@ void CheckOptions(const SemiGlobalOptions& o) {
   RequireOdd("window", o.window);
   RequireRange("p2", o.p2, 0, internal::kLargestPenalty);
   RequireRange("p1", o.p1, 0, o.p2);
-  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, internal::kLargestUniqueness);
-  RequireRange("left_right_max", o.left_right_max, -1, kLargestDisparity);
-  RequireRange("speckle_window", o.speckle_window, 0, 1e9);
-  RequireRange("speckle_range", o.speckle_range, 0, kLargestDisparity);
+  CheckOptions(static_cast<const MatchChecks&>(o));
 }
 
 namespace {

@@ -16,15 +16,15 @@ namespace sgf::stereo {
 /// on the others. A p2 that falls with the intensity step, as Hirschmueller proposes, makes matches
 /// fewer and better there but filled maps no better, and it would bring back what sgf does away
 /// with: a dependence on the gain of the images.
-struct SemiGlobalOptions : CostOptions {
+///
+/// Checks are those of BlockMatcher: the uniqueness is that of OpenCV's sample for SGBM, left-right
+/// check and largest step in a region are Hirschmueller's (Sec. 2.3, 2.5.1), as is the parabola.
+struct SemiGlobalOptions : CostOptions, MatchChecks {
   int window = 5;
   int p1 = 24;
   int p2 = 120;
-  Subpixel subpixel = Subpixel::kParabola;  ///< Hirschmueller, Sec. 2.3
-  double uniqueness_pct = 10;               ///< as in BlockMatcher; OpenCV's sample for SGBM
-  int left_right_max = 1;                   ///< Hirschmueller, Sec. 2.3
-  int speckle_window = 0;                   ///< off, as in cv::StereoSGBM
-  double speckle_range = 1;                 ///< Hirschmueller, Sec. 2.5.1
+
+  SemiGlobalOptions() : MatchChecks{.subpixel = Subpixel::kParabola} {}
 
   template <class V>
   void VisitFields(V&& visit) {
@@ -32,16 +32,7 @@ struct SemiGlobalOptions : CostOptions {
     visit("window", window, "px", "side of the square over which costs are averaged first, odd");
     visit("p1", p1, "mean cost / 64", "penalty of a step of one disparity along a path");
     visit("p2", p2, "mean cost / 64", "penalty of a larger step, at least p1");
-    visit("subpixel", subpixel, "", "interpolation of the winner's cost");
-    visit(
-        "uniqueness_pct", uniqueness_pct, "%",
-        "a match is dropped unless every candidate other than the winner and its neighbours costs "
-        "more than (1 + this) times the winner; 0 keeps all");
-    visit("left_right_max", left_right_max, "px",
-          "largest difference to the disparity found from the right image; -1 turns the check off");
-    visit("speckle_window", speckle_window, "px",
-          "connected regions up to this size are dropped; 0 keeps all");
-    visit("speckle_range", speckle_range, "px", "largest step inside a connected region");
+    MatchChecks::VisitFields(visit);
   }
 };
 
@@ -67,7 +58,8 @@ void CheckOptions(const SemiGlobalOptions& options);
 /// disparities, 125 MB for 1482 x 994 px and 256. In return, costs are made twice and half of the
 /// paths are followed twice. At most two threads have work.
 ///
-/// Results are the same bits for any number of threads and any instruction set.
+/// Results are the same bits for any number of threads and any instruction set. One matcher may
+/// serve several threads at once.
 class SemiGlobal {
  public:
   /// @throws Error for an option out of range, with its name and value.

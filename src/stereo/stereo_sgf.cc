@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include <sgf/stereo/block_matcher.h>
 #include <sgf/stereo/mesh_stereo.h>
 #include <sgf/stereo/opencv_matcher.h>
@@ -63,9 +65,19 @@ cv::Ptr<StereoSgf> StereoSgf::create(int num_disparities, int block_size) {
       stereo::BlockMatcherOptions{}, num_disparities, block_size));
 }
 
-cv::Ptr<StereoSgfSemiGlobal> StereoSgfSemiGlobal::create(int num_disparities, int block_size) {
+cv::Ptr<StereoSgfSemiGlobal> StereoSgfSemiGlobal::create(
+    int min_disparity, int num_disparities, int block_size, int p1, int p2, int disp12_max_diff,
+    int /*pre_filter_cap*/, int uniqueness_ratio, int speckle_window_size, int speckle_range) {
+  stereo::SemiGlobalOptions options;
+  options.min_disparity = min_disparity;
+  if (p1 != 0) options.p1 = p1;
+  if (p2 != 0) options.p2 = p2;
+  if (disp12_max_diff != 0) options.left_right_max = std::max(disp12_max_diff, -1);
+  options.uniqueness_pct = uniqueness_ratio;
+  options.speckle_window = speckle_window_size;
+  options.speckle_range = speckle_range;
   return cv::makePtr<StereoSgfSemiGlobalImpl>(
-      CheckedOptions<stereo::SemiGlobal>(stereo::SemiGlobalOptions{}, num_disparities, block_size));
+      CheckedOptions<stereo::SemiGlobal>(options, num_disparities, block_size));
 }
 
 cv::Ptr<StereoSgfMesh> StereoSgfMesh::create(int num_disparities, int block_size) {

@@ -118,7 +118,7 @@ void SgfBm(benchmark::State& state, const Case& c, const std::string& isa, int t
 void SgfSgm(benchmark::State& state, const Case& c, const std::string& isa, int threads) {
   cv::setNumThreads(1);
   RestrictSimd(isa);
-  const auto matcher = StereoSgfSemiGlobal::create(c.disparities, kSemiGlobalWindow);
+  const auto matcher = StereoSgfSemiGlobal::create(0, c.disparities, kSemiGlobalWindow);
   matcher->setUniquenessRatio(kUniqueness);
   matcher->setThreads(threads);
   Measure(state, c, *matcher);

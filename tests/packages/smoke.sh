@@ -99,6 +99,9 @@ try_libraries() {
   say "libsgf-dev: a project that links sgf::stereo"
   build "$here/../tools/consumer"
   expect '^disparity 7$' "$work/build_consumer/consumer"
+  say "libsgf-dev: the examples that it installs"
+  build /usr/share/sgf/examples
+  expect '^2 of 2 frames have a pose$' "$work/build_examples/keyframe_odometry" "$work/flight" "$work/path.txt"
   say "libmrpt-sgf-odometry-dev: the examples that it installs"
   build /usr/share/mrpt-sgf-odometry/examples/poses
   expect 'with pose: 2' "$work/build_poses/sgf_poses" "$work/flight.rawlog"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from test_tools import fails, run
+from test_tools import fails, repeat, run
 
 FRAMES, WIDTH, HEIGHT = 6, 320, 200
 FOCAL_PX, BASELINE_M, DISPARITY_PX, STEP_PX = 200, 0.2, 16, 2
@@ -59,6 +59,12 @@ def test_changed_light_is_put_on_and_survived(sequence, tmp_path):
     light = ["--change.exposure-low", "0.5", "--change.exposure-high", "0.6", "--change.period-s", "0.1"]
     assert run("sgf_align", sequence, "-o", out, *light).returncode == 0
     np.testing.assert_allclose(positions(out), true_positions(FRAMES), atol=0.004)
+
+
+def test_a_run_is_repeated_by_its_options(sequence, tmp_path):
+    flags = ["--alignment.residual", "ngv", "--change.exposure-low", "0.7"]
+    first, again = repeat("sgf_align", sequence, "--frames", "3", flags=flags, out=tmp_path)
+    assert (again / "trajectory.txt").read_bytes() == (first / "trajectory.txt").read_bytes()
 
 
 def test_part_of_a_sequence(sequence, tmp_path):

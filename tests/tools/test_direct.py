@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from test_tools import fails, run
+from test_tools import fails, repeat, run
 
 FRAMES, WIDTH, HEIGHT, STEP_PX = 40, 320, 240, 1
 
@@ -82,6 +82,12 @@ def test_needs_depth_or_a_second_camera_for_alignment(sequence, tmp_path):
     (tmp_path / "images").symlink_to(sequence / "image_0")
     (tmp_path / "camera.txt").write_text(f"Pinhole 200 200 160 120 0\n{WIDTH} {HEIGHT}\n")
     fails(run("sgf_align", tmp_path, "-o", tmp_path / "out"), "has one camera and no depth")
+
+
+def test_a_run_is_repeated_by_its_options(sequence, tmp_path):
+    flags = ["--preset", "fast", "--depth.residual", "sgf", "--window.sigma-intrinsics", "0.1"]
+    first, again = repeat("sgf_direct", sequence, "--frames", "20", flags=flags, out=tmp_path)
+    assert (again / "trajectory.txt").read_bytes() == (first / "trajectory.txt").read_bytes()
 
 
 def test_online_poses_are_those_of_tracked_frames(sequence, tmp_path):

@@ -1,4 +1,4 @@
-"""sgf_stereo and sgf_eval from the command line, and the installed package."""
+"""sgf_stereo and sgf_eval from the command line."""
 
 import json
 import os
@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-HERE = Path(__file__).resolve().parent
 BUILD = Path(os.environ["SGF_BUILD_DIR"])
 SHIFT = 6
 SIZE = (60, 100)  # rows, columns
@@ -77,6 +76,16 @@ def fails(result, *parts):
     for part in parts:
         assert str(part) in result.stderr
     return True
+
+
+def repeat(program, *inputs, flags, out):
+    """Runs a program with flags, then with the options.yaml that it has left: its folders, whose options are equal."""
+    first, again = out / "first", out / "again"
+    for folder, options in ((first, flags), (again, ["--config", first / "options.yaml"])):
+        result = run(program, *inputs, "-o", folder, *options)
+        assert result.returncode == 0, result.stderr
+    assert (again / "options.yaml").read_text() == (first / "options.yaml").read_text()
+    return first, again
 
 
 def test_a_pair_gives_disparities_pictures_and_scores(scene, pair, tmp_path):
@@ -198,6 +207,40 @@ def test_flags_come_on_top_of_the_options_file(pair, tmp_path):
     run("sgf_stereo", *pair, "-o", tmp_path / "out", "--config", config, "--window", 7)
     options = (tmp_path / "out" / "options.yaml").read_text()
     assert "window: 7" in options and "metric: pm" in options
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_run_is_repeated_by_its_options(pair, tmp_path, method):
+    flags = ["--method", method, "--fill", "--max-disp", 9, "--window", 7, "--threads", 1]
+    if method == "bm":
+        flags += ["--metric", "pm", "--pm.alpha", "0.3", "--epsilon.scope", "window"]
+    first, again = repeat("sgf_stereo", *pair, flags=flags, out=tmp_path)
+    assert (again / "disparity.pfm").read_bytes() == (first / "disparity.pfm").read_bytes()
+
+
+def test_flags_come_on_top_of_the_options_of_a_run(pair, tmp_path):
+    run("sgf_stereo", *pair, "-o", tmp_path / "out", "--fill", "--max-disp", 16)
+    saved = tmp_path / "out" / "options.yaml"
+    more = ["--config", saved, "--fill=false", "--window", 7]
+    assert run("sgf_stereo", *pair, "-o", tmp_path / "more", *more).returncode == 0
+    options = (tmp_path / "more" / "options.yaml").read_text()
+    assert options == saved.read_text().replace("fill: true", "fill: false").replace("  window: 9", "  window: 7")
+    more = ["--config", saved, "--method", "opencv_bm"]
+    assert fails(run("sgf_stereo", *pair, "-o", tmp_path / "other", *more), "metric", "opencv_bm")
+
+
+def test_what_a_run_cannot_have_said_is_named(pair, tmp_path):
+    config = tmp_path / "run.yaml"
+    for text, parts in {
+        "options: {window: 5}\nfil: true\n": [f"{config}:2", "unknown key 'fil'"],
+        "options:\n  windwo: 5\n": [f"{config}:2", "unknown key 'windwo'"],
+        "options: {window: 5}\nfill: much\n": [f"{config}:2", "fill"],
+        "options: {window: 5}\nmethod: magic\n": ["magic", "bm, mesh"],
+        "options: 5\n": [f"{config}:1", "map of options"],
+    }.items():
+        config.write_text(text)
+        assert fails(run("sgf_stereo", *pair, "-o", tmp_path / "out", "--config", config), *parts)
+    assert fails(run("sgf_align", tmp_path, "-o", tmp_path / "out", "--config", config), f"{config}:1")
 
 
 def test_list_metrics_prints_the_table():
@@ -395,15 +438,3 @@ def test_a_change_is_made_to_the_right_images(sweep, tmp_path):
     assert "exposure: 0.001" in options.read_text()
     result = run("sgf_eval", *sweep, "--column", "sgf", "--change", "dark")
     assert result.returncode == 2 and "--changes" in result.stderr
-
-
-def test_another_project_links_the_installed_package(tmp_path):
-    def cmake(*arguments):
-        subprocess.run(["cmake", *map(str, arguments)], check=True, capture_output=True, timeout=300)
-
-    cmake("--install", BUILD, "--prefix", tmp_path / "prefix")
-    cmake("-S", HERE / "consumer", "-B", tmp_path / "build", "-G", "Ninja",
-          f"-DCMAKE_PREFIX_PATH={tmp_path / 'prefix'}")
-    cmake("--build", tmp_path / "build")
-    result = subprocess.run([tmp_path / "build" / "consumer"], capture_output=True, text=True, check=True)
-    assert result.stdout == "disparity 7\n"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from test_tools import fails, run
+from test_tools import fails, repeat, run
 
 FRAMES, WIDTH, HEIGHT = 20, 320, 240
 FOCAL_PX, BASELINE_M, DISPARITY_PX, STEP_PX = 200, 0.2, 16, 2
@@ -151,6 +151,12 @@ def test_calibration_is_written_when_it_is_estimated(whole, tmp_path):
     assert last["sigma_rotation_rad"] < 1e-6  # taken as right
     refused = run("sgf_vio", whole, "-o", tmp_path / "no", "--calibration.time-offset-sd-s", "1")
     assert refused.returncode == 2 and "calibration.time_offset_sd_s" in refused.stderr
+
+
+def test_a_run_is_repeated_by_its_options(whole, tmp_path):
+    flags = [*FLAGS, "--flow.residual", "ngv", "--window.gravity", "9.8"]
+    first, again = repeat("sgf_vio", whole, "--frames", "6", flags=flags, out=tmp_path)
+    assert (again / "states.csv").read_bytes() == (first / "states.csv").read_bytes()
 
 
 def test_is_the_same_for_any_number_of_threads(whole, tmp_path):

@@ -120,7 +120,9 @@ int main(int argc, char** argv)
 	app.add_option("-i,--input", folder, "folder of the data set")->required();
 	app.add_option("-o,--output", rawlog, "rawlog to write")->required();
 	app.add_option(
-		"-l,--layout", options.layout, "layout (default: found by looking)");
+		"-l,--layout", options.layout,
+		"euroc, kitti_odometry, tum_rgbd or icl_nuim (default: found by "
+		"looking)");
 	app.add_option(
 		"-n,--frames", options.max_frames,
 		"frames to take, from the first (default: all)");

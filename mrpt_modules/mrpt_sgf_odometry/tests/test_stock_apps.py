@@ -426,6 +426,30 @@ def test_bad_input_is_named(tmp_path):
     assert not list(tmp_path.glob("out*"))
 
 
+def test_layouts_are_called_by_the_names_that_are_known(tmp_path):
+    known = run(BUILD / "bin" / "dataset2rawlog", "-i", tmp_path, "-o", tmp_path / "x", "-l", "kiti").stderr
+    names = set(re.search("known: (.*)", known)[1].split(", ")) - {"tum_mono"}  # which has no depth
+    told = (
+        tool("dataset2rawlog", "--help"),
+        (MODULE / "share" / "man" / "man1" / "dataset2rawlog.1").read_text(),
+        (MODULE / "include" / "mrpt" / "sgf" / "CObservationSource.h").read_text(),
+    )
+    for text in told:
+        assert set(re.findall(r"\b(?:euroc|kitti|tum|icl)(?:_[a-z]+)?\b", text)) == names
+
+
+def test_what_the_sample_configuration_proposes_is_accepted(tmp_path):
+    dataset = room.write_euroc(tmp_path / "room", room.curve(2))
+    sample = (MODULE / "config" / "sgf-odometry.ini").read_text()
+    proposed = dict(re.findall(r"(?m)^# ([\w.]+) += (\w+)$", sample))
+    assert proposed == {"flow.residual": "ngv", "flow.image.epsilon.scope": "window"}
+    config = tmp_path / "proposed.ini"
+    config.write_text(re.sub("(?m)^flow.residual.*", "", sample).replace("# flow.", "flow."))
+    tool("sgf-odometry-cli", "-i", dataset, "-o", tmp_path / "out", "-c", config)
+    config.write_text(config.read_text().replace("= window", "= windows"))
+    fails("sgf-odometry-cli", "-i", dataset, "-o", tmp_path / "out", "-c", config, parts=["'windows'"])
+
+
 def test_bad_configurations_are_named(tmp_path):
     dataset = room.write_euroc(tmp_path / "room", room.curve(2))
     config = edited_ini("sgf-odometry.ini", tmp_path / "bad.ini", use_imu="maybe")
@@ -493,6 +517,18 @@ def test_the_stand_alone_example_prints_poses(installed, tmp_path):
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("(x,y,z,yaw,pitch,roll)=") == 5
     assert "with pose: 5" in result.stdout
+    assert run(program).returncode == 2
+
+
+def test_the_stand_alone_example_leaves_out_no_frame_that_waits(installed, tmp_path):
+    program = build_example("poses", installed, tmp_path)
+    dataset, rawlog = room.write_euroc(tmp_path / "room", room.curve(5)), tmp_path / "in.rawlog"
+    tool("dataset2rawlog", "-i", dataset, "-o", rawlog, "--no-imu")
+    config = edited_ini("sgf-odometry.ini", tmp_path / "in.ini", estimator="stereo_inertial")
+    result = run(program, rawlog, config)
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.count("(x,y,z,yaw,pitch,roll)=") == 5
+    assert "with pose: 5" in result.stdout
 
 
 def test_the_plug_in_example_needs_mrpt_only(installed, tmp_path):
@@ -503,6 +539,7 @@ def test_the_plug_in_example_needs_mrpt_only(installed, tmp_path):
     result = run(program, config)
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("CObservationRobotPose") == 5
+    assert run(program).returncode == 2
 
 
 def test_programs_and_manuals_are_installed(installed):

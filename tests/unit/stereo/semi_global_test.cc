@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <functional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -382,7 +384,7 @@ TEST(StereoSgfSemiGlobal, SwapsInForStereoSgbmThroughTheSameInterface) {
   const auto [left, right] = ShiftedPair({160, 60}, 11, 1);
   for (const cv::Ptr<cv::StereoMatcher>& matcher :
        {cv::Ptr<cv::StereoMatcher>(cv::StereoSGBM::create(0, 32, 5)),
-        cv::Ptr<cv::StereoMatcher>(StereoSgfSemiGlobal::create(32, 5))}) {
+        cv::Ptr<cv::StereoMatcher>(StereoSgfSemiGlobal::create(0, 32, 5))}) {
     cv::Mat disparity;
     matcher->compute(left, right, disparity);
     ASSERT_EQ(disparity.type(), CV_16SC1);
@@ -392,7 +394,7 @@ TEST(StereoSgfSemiGlobal, SwapsInForStereoSgbmThroughTheSameInterface) {
 }
 
 TEST(StereoSgfSemiGlobal, KeepsItsParameters) {
-  const auto matcher = StereoSgfSemiGlobal::create(48, 7);
+  const auto matcher = StereoSgfSemiGlobal::create(0, 48, 7);
   EXPECT_EQ(matcher->getNumDisparities(), 48);
   EXPECT_EQ(matcher->getBlockSize(), 7);
   matcher->setMinDisparity(-3);
@@ -417,11 +419,50 @@ TEST(StereoSgfSemiGlobal, KeepsItsParameters) {
   EXPECT_EQ(matcher->getThreads(), 2);
 }
 
+TEST(StereoSgfSemiGlobal, TakesParametersInTheOrderOfStereoSgbm) {
+  constexpr std::array kAll = {-3, 48, 7, 9, 80, 2, 63, 12, 50, 4};
+  const auto create = [&](auto make) { return std::apply(make, kAll); };
+  const auto sgbm = create([](auto... all) { return cv::StereoSGBM::create(all...); });
+  const auto ours = create([](auto... all) { return StereoSgfSemiGlobal::create(all...); });
+  EXPECT_EQ(ours->getMinDisparity(), sgbm->getMinDisparity());
+  EXPECT_EQ(ours->getNumDisparities(), sgbm->getNumDisparities());
+  EXPECT_EQ(ours->getBlockSize(), sgbm->getBlockSize());
+  EXPECT_EQ(ours->getP1(), sgbm->getP1());
+  EXPECT_EQ(ours->getP2(), sgbm->getP2());
+  EXPECT_EQ(ours->getDisp12MaxDiff(), sgbm->getDisp12MaxDiff());
+  EXPECT_EQ(ours->getUniquenessRatio(), sgbm->getUniquenessRatio());
+  EXPECT_EQ(ours->getSpeckleWindowSize(), sgbm->getSpeckleWindowSize());
+  EXPECT_EQ(ours->getSpeckleRange(), sgbm->getSpeckleRange());
+}
+
+TEST(StereoSgfSemiGlobal, ZerosStandForDefaults) {
+  const SemiGlobalOptions defaults;
+  for (const auto& matcher :
+       {StereoSgfSemiGlobal::create(), StereoSgfSemiGlobal::create(0, 0, 5, 0, 0, 0)}) {
+    EXPECT_EQ(matcher->getMinDisparity(), defaults.min_disparity);
+    EXPECT_EQ(matcher->getNumDisparities(), defaults.num_disparities);
+    EXPECT_EQ(matcher->getBlockSize(), defaults.window);
+    EXPECT_EQ(matcher->getP1(), defaults.p1);
+    EXPECT_EQ(matcher->getP2(), defaults.p2);
+    EXPECT_EQ(matcher->getDisp12MaxDiff(), defaults.left_right_max);
+    EXPECT_EQ(matcher->getUniquenessRatio(), defaults.uniqueness_pct);
+    EXPECT_EQ(matcher->getSpeckleWindowSize(), defaults.speckle_window);
+    EXPECT_EQ(matcher->getSpeckleRange(), defaults.speckle_range);
+  }
+  EXPECT_EQ(StereoSgfSemiGlobal::create(0, 16, 5, 0, 0, -5)->getDisp12MaxDiff(), -1);
+}
+
+TEST(StereoSgfSemiGlobal, ThrowsForPenaltiesInTheUnitsOfStereoSgbm) {
+  EXPECT_EQ(ErrorMessage([] { StereoSgfSemiGlobal::create(0, 16, 5, 8 * 25, 32 * 25); }),
+            "p2: must be in [0, 127], got 800");
+}
+
 TEST(StereoSgfSemiGlobal, ThrowsForBadParametersAndImages) {
-  EXPECT_THROW(StereoSgfSemiGlobal::create(-16, 5), Error);
-  EXPECT_THROW(StereoSgfSemiGlobal::create(16, 4), Error);
+  EXPECT_THROW(StereoSgfSemiGlobal::create(0, -16, 5), Error);
+  EXPECT_THROW(StereoSgfSemiGlobal::create(0, 16, 4), Error);
   cv::Mat disparity;
-  EXPECT_THROW(StereoSgfSemiGlobal::create(16, 5)->compute(cv::Mat(), cv::Mat(), disparity), Error);
+  EXPECT_THROW(StereoSgfSemiGlobal::create(0, 16, 5)->compute(cv::Mat(), cv::Mat(), disparity),
+               Error);
 }
 
 }  // namespace

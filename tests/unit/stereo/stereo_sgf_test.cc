@@ -1,3 +1,6 @@
+#include <future>
+#include <vector>
+
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 #include <support/stereo_images.h>
@@ -62,6 +65,24 @@ TEST(StereoSgf, WritesIntoTheCallersMemory) {
   const void* memory = disparity.data;
   StereoSgf::create(16, 9)->compute(left, right, disparity);
   EXPECT_EQ(disparity.data, memory);
+}
+
+TEST(StereoSgf, OneMatcherServesSeveralThreads) {
+  const auto pair = ShiftedPair({96, 48}, 5, 1);
+  for (const cv::Ptr<cv::StereoMatcher>& matcher :
+       {cv::Ptr<cv::StereoMatcher>(StereoSgf::create(16, 9)),
+        cv::Ptr<cv::StereoMatcher>(StereoSgfSemiGlobal::create(0, 16, 5)),
+        cv::Ptr<cv::StereoMatcher>(StereoSgfMesh::create(16, 9))}) {
+    const auto compute = [&] {
+      cv::Mat1s disparity;
+      matcher->compute(pair.first, pair.second, disparity);
+      return disparity;
+    };
+    std::vector<std::future<cv::Mat1s>> others;
+    for (int i = 0; i < 4; ++i) others.push_back(std::async(std::launch::async, compute));
+    const cv::Mat1s expected = compute();
+    for (auto& other : others) EXPECT_EQ(cv::countNonZero(other.get() != expected), 0);
+  }
 }
 
 TEST(StereoSgf, ThrowsForBadParametersAndImages) {

@@ -7,8 +7,13 @@
 
 #include <iostream>
 
-int main(int, char** argv)
+int main(int argc, char** argv)
 {
+	if (argc != 2)
+	{
+		std::cerr << "usage: sgf_sensor CONFIG\n";
+		return 2;
+	}
 	mrpt::system::loadPluginModules(PLUGIN);
 	const auto sensor =
 		mrpt::hwdrivers::CGenericSensor::createSensorPtr("CSgfOdometrySensor");

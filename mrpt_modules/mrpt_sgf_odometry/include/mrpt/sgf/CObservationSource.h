@@ -40,7 +40,8 @@ std::unique_ptr<CObservationSource> openRawlog(const std::string& file);
  * \ingroup mrpt_sgf_odometry_grp */
 struct TDatasetOptions
 {
-	/** "euroc", "kitti", "tum", or empty to tell by the folder's content */
+	/** "euroc", "kitti_odometry", "tum_rgbd", "icl_nuim", or empty to tell by
+	 * the folder's content */
 	std::string layout;
 	/** Read the inertial sensor, if the data set has one */
 	bool imu = true;

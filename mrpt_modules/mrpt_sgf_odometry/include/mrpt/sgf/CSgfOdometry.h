@@ -95,8 +95,8 @@ enum class TSkipReason : uint8_t
  * \ingroup mrpt_sgf_odometry_grp */
 const char* describe(TSkipReason reason);
 
-/** What TEstimator::STEREO_INERTIAL knows beside the pose. The map frame is that
- * of the poses; it is not turned when gravity is found.
+/** What TEstimator::STEREO_INERTIAL knows beside the pose. The map frame is
+ * that of the poses; it is not turned when gravity is found.
  * \ingroup mrpt_sgf_odometry_grp */
 struct TInertialState
 {
@@ -195,10 +195,10 @@ struct TEstimate;
  * listed by report(); no input makes the processing methods throw.
  *
  * The covariance of the alignment (of the motion since the key-frame), or of
- * the state in the window of frames, is carried from the camera's tangent space to the robot's by the adjoint, and to
- * MRPT's (x y z yaw pitch roll) by the inverse of the right Jacobian of yaw,
- * pitch and roll. It grows without bound at pitch +-90 degrees, where yaw and
- * roll cannot be told apart.
+ * the state in the window of frames, is carried from the camera's tangent space
+ * to the robot's by the adjoint, and to MRPT's (x y z yaw pitch roll) by the
+ * inverse of the right Jacobian of yaw, pitch and roll. It grows without bound
+ * at pitch +-90 degrees, where yaw and roll cannot be told apart.
  *
  * \ingroup mrpt_sgf_odometry_grp
  */

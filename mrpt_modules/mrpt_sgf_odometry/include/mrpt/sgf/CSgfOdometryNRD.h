@@ -10,6 +10,7 @@
 #include <mrpt/graphslam/interfaces/CNodeRegistrationDecider.h>
 #include <mrpt/sgf/CSgfOdometry.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
