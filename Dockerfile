@@ -1,6 +1,6 @@
 # The whole reproduction in one image: packages and Release build at `docker build`, experiments at `docker run`.
 #
-#   docker build -t sgf .
+#   docker build -t sgf --build-arg REVISION="$(git describe --always --dirty --abbrev=40)" .
 #   docker run --rm --user "$(id -u):$(id -g)" \
 #     -v "$PWD/results:/opt/beyond-photometric/results" \
 #     -v /path/to/datasets:/data:ro sgf --data /data
@@ -9,6 +9,8 @@
 # Results go to the first mount, best the results/ folder of a clone: it also holds the reference files
 # that the tests compare with.
 #
+#   --build-arg REVISION=...             what is built, for programs and runs to put on record: there is no git in the
+#                                        image; "unknown" without it
 #   --build-arg BASE=debian@sha256:...   the base image, here pinned by its digest
 #   --build-arg SUITE=smoke              no tests in the image; table1 is made once at `docker build`, as a trial
 #
@@ -46,7 +48,10 @@ COPY --chown=sgf:sgf . .
 # Any user id may run the image (--user): everything is writable to all, the home is /tmp, and the files whose mode
 # CMake sets, which only their owner may do, are left for the run to make anew.
 ENV HOME=/tmp USER=sgf
-RUN case "${SUITE}" in \
+ARG REVISION
+LABEL org.opencontainers.image.revision="${REVISION:-unknown}"
+RUN echo "${REVISION:-unknown}" > REVISION \
+ && case "${SUITE}" in \
       full) cmake --preset release && cmake --build --preset release ;; \
       smoke) ./reproduce.sh --only table1 && cat results/tables/table1.csv \
           && find results -mindepth 1 -maxdepth 1 ! -name reference -exec rm -rf {} + ;; \

@@ -33,14 +33,16 @@ Usage: ./reproduce.sh [OPTION]...        install what is missing, build, run the
   --runs N        runs of each line of the tables that repeat runs (odometry, table3);
                   default: a few, for a quick look; rankings take 10, shares of success 25
   --jobs N        parallel jobs; default: the number of processors
-  --cluster slurm build here, and submit each job to Slurm (docs/scaling.md), --jobs of them at a time,
-                  200 by default; project and data have to lie in folders that all nodes share
+  --cluster slurm build here, on all processors, and submit each job to Slurm (docs/scaling.md), --jobs of
+                  them at a time, 200 by default; project and data have to lie in folders that all nodes share
   --verify        run a sample of what was made again, one of each kind and about ten minutes in all, and
                   compare: bit for bit on the same machine with the same packages and code, else within
                   paper/tolerances.yaml; exit code 1 if anything differs or nothing was made
   --list          list the experiments and stop
   --clean         remove what was built and generated (not results/reference and results/external) and stop
   --help          show this text and stop
+
+With test go --data, --jobs and --sanitize; --verify, --list and --clean stand alone.
 
 Results: results/report.html and .pdf, results/tables, results/figures; logs: results/logs. What is up to
 date is not made again, and an interrupted run goes on where it stopped.
@@ -112,7 +114,7 @@ These packages are missing, and installing needs root or sudo without a password
 
 Or run everything in a container:
 
-  docker build -t sgf .
+  docker build -t sgf --build-arg REVISION="\$(git describe --always --dirty --abbrev=40)" .
   docker run --rm --user "\$(id -u):\$(id -g)" \\
     -v "\$PWD/results:/opt/beyond-photometric/results" sgf
 END
@@ -126,8 +128,11 @@ apt_get() {
     fail "apt-get $1 failed; log: $logs/packages.log"
 }
 
+# install_packages SECTION...: those that are missing; the first step of whatever leaves logs.
 install_packages() {
   local -a missing
+  mkdir -p "$logs"
+  printf '== packages%s\n' "$(printf ' [%s]' "$@")"
   command -v dpkg-query >/dev/null ||
     fail "this is not a Debian system; use the Dockerfile, or install what packages.apt lists"
   mapfile -t missing < <(missing_packages "$@")
@@ -198,9 +203,17 @@ mrpt_programs() {
 
 # --- commands ------------------------------------------------------------------------------------
 
+# A run holds results/.lock (paper/sgf_paper/file_lock.py); one that was killed may take a moment to let go of it.
 clean() {
-  rm -rf build/release build/sanitize build/fuzz datasets/generated
-  find results -mindepth 1 -maxdepth 1 ! -name reference ! -name external -exec rm -rf {} + 2>/dev/null || true
+  local -a made
+  local problems
+  if [[ -e results/.lock ]]; then
+    { exec 9>>results/.lock; } 2>/dev/null || fail "$project/results belongs to another user; nothing was removed"
+    flock --timeout 5 9 || fail "a run is at work in $project/results; nothing was removed"
+  fi
+  mapfile -d '' -t made < <(find results -mindepth 1 -maxdepth 1 ! -name reference ! -name external -print0 2>/dev/null)
+  problems=$(rm -rf build/release build/sanitize build/fuzz datasets/generated "${made[@]}" 2>&1) ||
+    fail "not everything could be removed: $(head -n 1 <<<"$problems")"
   echo "Removed build/release, build/sanitize, build/fuzz, datasets/generated and all of results but reference and external."
 }
 
@@ -214,7 +227,6 @@ fetch_datasets() {
 
 run_experiments() {
   local -a mrpt
-  echo "== packages [run] [report]"
   install_packages run report
   ((${#full[@]} == 0)) || fetch_datasets
   echo "== build"
@@ -229,7 +241,6 @@ run_experiments() {
 }
 
 run_tests() {
-  echo "== packages [run] [report] [test]"
   install_packages run report test
   echo "== build"
   configure "$preset" ON
@@ -239,6 +250,15 @@ run_tests() {
   exec ctest --preset "$preset" --parallel "$jobs"
 }
 
+# Without anything on record Python is not asked: on a fresh machine it lacks its packages.
+verify_runs() {
+  [[ -n $(find results/raw results/runs -name run.json -print -quit 2>/dev/null) ]] ||
+    fail "no finished run in $project/results; run ./reproduce.sh first"
+  install_packages run report
+  cd paper
+  exec "$python" -m sgf_paper.verify --results "$project/results"
+}
+
 # require_number OPTION [VALUE]...: the value of an option that takes a positive number.
 require_number() {
   [[ ${2:-} =~ ^[1-9][0-9]*$ ]] || wrong_usage "$1 needs a positive number, not '${2:-}'"
@@ -246,7 +266,14 @@ require_number() {
 
 # --- command line --------------------------------------------------------------------------------
 
-mode=run
+# The modes that each option goes with; `run` is that of a command line without one.
+declare -A goes_with=(
+  [--only]=run [--data]="run test" [--sanitize]=test [--full]=run [--accept-licences]=run
+  [--runs]=run [--jobs]="run test" [--cluster]=run
+)
+
+mode=
+given=()
 stages=()
 preset=release
 full=()
@@ -257,18 +284,22 @@ jobs=
 cluster=()
 
 while (($#)); do
+  given+=("$1")
   case $1 in
-    test) mode="test" ;;
+    test | --list | --clean | --verify)
+      [[ -z $mode || $mode == "$1" ]] || wrong_usage "$1 does not go with $mode"
+      mode=$1
+      ;;
     --only)
+      [[ ${2:--} != -* && $2 != test ]] || wrong_usage "--only needs the name of an experiment"
       while (($# > 1)) && [[ $2 != -* && $2 != test ]]; do
         require_experiment "$2"
         stages+=("$2")
         shift
       done
-      ((${#stages[@]})) || wrong_usage "--only needs the name of an experiment"
       ;;
     --data)
-      (($# > 1)) || wrong_usage "--data needs a folder"
+      [[ -n ${2:-} ]] || wrong_usage "--data needs a folder"
       data=$2
       shift
       ;;
@@ -290,7 +321,6 @@ while (($#)); do
       cluster=(--cluster slurm)
       shift
       ;;
-    --list | --clean | --verify) mode=${1#--} ;;
     --help)
       usage
       exit 0
@@ -300,16 +330,18 @@ while (($#)); do
   shift
 done
 
-if [[ $mode == test && ${#stages[@]} -gt 0 ]]; then
-  wrong_usage "--only chooses experiments; it does not go with test"
-fi
-if [[ $preset == sanitize && $mode != test ]]; then
-  wrong_usage "--sanitize goes with test only"
-fi
-if [[ ${#accepted[@]} -gt 0 && (${#full[@]} -eq 0 || $mode != run) ]]; then
+mode=${mode:-run}
+for option in "${given[@]}"; do
+  [[ " ${goes_with[$option]:-$mode} " == *" $mode "* ]] ||
+    wrong_usage "$option does not go with ${mode/#run/a run of experiments}"
+done
+if [[ ${#accepted[@]} -gt 0 && ${#full[@]} -eq 0 ]]; then
   wrong_usage "--accept-licences goes with --full only"
 fi
-if [[ $mode == run && ${#full[@]} -gt 0 && -z $data ]]; then
+if ((${#cluster[@]})); then
+  command -v sbatch >/dev/null || fail "sbatch is not installed: is this a machine of the cluster?"
+fi
+if [[ ${#full[@]} -gt 0 && -z $data ]]; then
   data=$project/datasets/downloaded
   mkdir -p "$data"
 fi
@@ -319,24 +351,19 @@ if [[ -n $data ]]; then
   data=$(realpath -- "$data")
   cd -- "$project"
 fi
-at_once=${jobs:-200} # of a cluster
-jobs=${jobs:-$(nproc)}
-((${#cluster[@]})) || at_once=$jobs
+if ((${#cluster[@]})); then
+  at_once=${jobs:-200}
+  jobs=$(nproc) # of the build, which is made here
+else
+  jobs=${jobs:-$(nproc)}
+  at_once=$jobs
+fi
 ((${#stages[@]})) || mapfile -t stages < <(default_names)
 
 case $mode in
-  list) list_experiments ;;
-  clean) clean ;;
-  verify)
-    cd paper
-    exec "$python" -m sgf_paper.verify --results "$project/results"
-    ;;
-  run)
-    mkdir -p "$logs"
-    run_experiments
-    ;;
-  test)
-    mkdir -p "$logs"
-    run_tests
-    ;;
+  --list) list_experiments ;;
+  --clean) clean ;;
+  --verify) verify_runs ;;
+  run) run_experiments ;;
+  test) run_tests ;;
 esac

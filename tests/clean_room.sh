@@ -10,11 +10,13 @@ Usage: tests/clean_room.sh [OPTION]... [STEP]...
 
 Steps, in this order; default: table1 alone with --suite smoke, else all:
   table1      ./reproduce.sh --only table1, in the image
+  run         ./reproduce.sh, in the image (20 minutes on two cores, beside the build, which the image has)
+  verify      ./reproduce.sh --verify, in the image, of what the steps before it have made (10 minutes)
   packages    makes the Debian packages in the image, installs them in a bare Debian and tries them there
   test        ./reproduce.sh test, in the image (half an hour and more)
 
-  --suite SUITE  build argument of the Dockerfile: full (the default) or smoke, which has table1 only
-  --data DIR     folder with downloaded data sets, for table1 and test
+  --suite SUITE  build argument of the Dockerfile: full (the default) or smoke, which is for table1, run and verify
+  --data DIR     folder with downloaded data sets, for table1, run and test
   --work DIR     for base, image, logs and results, 20 GB; default: build/clean_room
   --fresh        make base and image anew; else the base is kept, and the image if it is of the same commit
   --help         show this text and stop
@@ -121,7 +123,7 @@ build_image() {
   "${buildah[@]}" images --quiet --filter "reference=localhost/sgf-$suite" |
     xargs --no-run-if-empty "${buildah[@]}" rmi --force
   contained "${buildah[@]}" bud --isolation chroot --pull-never \
-    --build-arg "BASE=$base" --build-arg "SUITE=$suite" --tag "$image" "$work/source"
+    --build-arg "BASE=$base" --build-arg "SUITE=$suite" --build-arg "REVISION=$commit" --tag "$image" "$work/source"
 }
 
 have_image() {
@@ -169,6 +171,14 @@ step_table1() {
   cat "$work/results/tables/table1.csv"
 }
 
+step_run() {
+  in_image ./reproduce.sh ${data:+--data /data}
+}
+
+step_verify() {
+  in_image ./reproduce.sh --verify
+}
+
 step_test() {
   in_image ./reproduce.sh test ${data:+--data /data}
 }
@@ -184,6 +194,7 @@ step_packages() {
 
 # --- command line ----------------------------------------------------------------------------------
 
+every_step=(table1 run verify packages test)
 user=4711 # any id that the image does not know
 base=localhost/debian:bookworm-slim
 suite=full
@@ -194,7 +205,7 @@ fresh=false
 
 while (($#)); do
   case $1 in
-    table1 | test | packages) steps+=("$1") ;;
+    table1 | run | verify | packages | test) steps+=("$1") ;;
     --suite)
       [[ ${2:-} == full || ${2:-} == smoke ]] || wrong_usage "--suite needs full or smoke, not '${2:-}'"
       suite=$2
@@ -221,10 +232,10 @@ while (($#)); do
 done
 
 if ((${#steps[@]} == 0)); then
-  steps=(table1)
-  [[ $suite == smoke ]] || steps+=(packages test)
+  steps=("${every_step[@]}")
+  [[ $suite == full ]] || steps=(table1)
 fi
-[[ $suite == full || ${steps[*]} == table1 ]] || wrong_usage "an image of suite smoke has neither tests nor packages"
+[[ $suite == full || " ${steps[*]} " != *" "@(packages|test)" "* ]] || wrong_usage "an image of suite smoke has neither tests nor packages"
 
 for program in apt-get buildah debootstrap flock git unshare; do
   command -v "$program" >/dev/null || fail "$program is not installed"
@@ -253,6 +264,6 @@ have_image "$base" || step base make_base
 step source export_source
 have_image "$image" || step image build_image
 step container make_container
-for name in table1 packages test; do
+for name in "${every_step[@]}"; do
   [[ " ${steps[*]} " != *" $name "* ]] || step "$name" "step_$name"
 done

@@ -121,12 +121,14 @@ def _output_of(*command: str | Path) -> str:
 def describe_code(diffs: Path) -> dict[str, str]:
     """Commit of the project and the hash of what differs from it, which is kept as <hash>.patch in `diffs`.
 
-    Files that git does not know count by name. Without git there is `unknown`.
+    Files that git does not know count by name. Without git it is what the file REVISION says, which the Dockerfile
+    writes, or else `unknown`.
     """
     git = ("git", "-C", PROJECT)
     commit = _output_of(*git, "rev-parse", "HEAD").strip() if (PROJECT / ".git").exists() else ""
     if not commit:
-        return {"commit": "unknown", "diff": ""}
+        revision = PROJECT / "REVISION"
+        return {"commit": revision.read_text().strip() if revision.exists() else "unknown", "diff": ""}
     diff = _output_of(*git, "diff", "--binary", "HEAD")
     unknown = _output_of(*git, "ls-files", "--others", "--exclude-standard").splitlines()
     diff += "".join(f"# not in git: {name}\n" for name in unknown)

@@ -1,10 +1,12 @@
 """reproduce.sh: options, packages, build and the test command."""
 
+import fcntl
 import re
+import shutil
 
 import pytest
 
-from conftest import PROJECT
+from conftest import HERE, PROJECT
 
 EXPERIMENTS = sorted(path.stem for path in (PROJECT / "paper" / "experiments").glob("*.yaml"))
 PROGRAMS = "sgf_align sgf_direct sgf_eval sgf_render sgf_stereo sgf_study sgf_vio stereo_bench"
@@ -50,6 +52,7 @@ def test_help_and_list_need_nothing_built(project):
         (["tests"], "unknown option 'tests'"),
         (["--only"], "--only needs"),
         (["--only", "--list"], "--only needs"),
+        (["--only", "table1", "--only"], "--only needs"),
         (["--only", "table1", "table8"], "unknown experiment 'table8'; known: bench_stereo"),
         (["--only", "../experiments/table1"], "unknown experiment"),
         (["--jobs", "0"], "--jobs needs a positive number, not '0'"),
@@ -60,11 +63,24 @@ def test_help_and_list_need_nothing_built(project):
         (["--cluster"], "--cluster needs the kind of cluster: slurm"),
         (["--cluster", "sge"], "--cluster needs the kind of cluster: slurm"),
         (["--data"], "--data needs a folder"),
+        (["--data", ""], "--data needs a folder"),
         (["--data", "/nonexistent/data"], "data folder '/nonexistent/data' does not exist"),
-        (["test", "--only", "table1"], "does not go with test"),
-        (["--sanitize"], "--sanitize goes with test only"),
         (["--accept-licences"], "--accept-licences goes with --full only"),
-        (["test", "--full", "--accept-licences"], "--accept-licences goes with --full only"),
+        (["--sanitize"], "--sanitize does not go with a run of experiments"),
+        (["test", "--only", "table1"], "--only does not go with test"),
+        (["test", "--full", "--accept-licences"], "--full does not go with test"),
+        (["--runs", "3", "test"], "--runs does not go with test"),
+        (["test", "--cluster", "slurm"], "--cluster does not go with test"),
+        (["--verify", "--only", "table1"], "--only does not go with --verify"),
+        (["--verify", "--cluster", "slurm"], "--cluster does not go with --verify"),
+        (["--verify", "--data", "/"], "--data does not go with --verify"),
+        (["--clean", "--only", "table1"], "--only does not go with --clean"),
+        (["--clean", "--sanitize"], "--sanitize does not go with --clean"),
+        (["--list", "--jobs", "3"], "--jobs does not go with --list"),
+        (["--list", "--full"], "--full does not go with --list"),
+        (["test", "--clean"], "--clean does not go with test"),
+        (["--list", "--clean"], "--clean does not go with --list"),
+        (["--clean", "--verify"], "--verify does not go with --clean"),
     ],
 )
 def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, message):
@@ -74,10 +90,32 @@ def test_wrong_usage_ends_with_2_before_anything_is_done(project, arguments, mes
     assert project.stub_log() == "" and not project.results.exists()
 
 
-@pytest.mark.parametrize("command", [["--list"], ["--clean"], ["test"], ["--only", "table1"]])
-def test_full_goes_with_everything(project, command):
-    code, output = project.run("--full", *command)
-    assert code == 0, output
+@pytest.fixture
+def programs(project):
+    """A folder for programs, to stand first on the PATH."""
+    (project.root / "programs").mkdir()
+    return project.root / "programs"
+
+
+def write_program(file, text):
+    file.write_text(f"#!/bin/bash\n{text}\n")
+    file.chmod(0o755)
+
+
+def test_a_cluster_is_missed_before_anything_is_done(project, programs):
+    for name in ("bash", "dirname"):
+        (programs / name).symlink_to(shutil.which(name))
+    code, output = project.run("--cluster", "slurm", PATH=str(programs))
+    assert (code, output) == (1, "Error: sbatch is not installed: is this a machine of the cluster?\n")
+
+
+@pytest.mark.parametrize("flags, processes", [(["--cluster", "slurm"], 3), ([], 200)])
+def test_jobs_of_a_cluster_are_not_those_of_the_build(project, programs, flags, processes):
+    for name, text in (("sbatch", "exit 1"), ("nproc", "echo 3")):
+        write_program(programs / name, text)
+    (project.root / "fail_build").touch()
+    project.run("--jobs", "200", *flags, PATH=f"{programs}:{HERE / 'stubs'}:/usr/bin:/bin")
+    assert f"--parallel {processes} " in project.stub_log()
 
 
 FETCH = """#!/usr/bin/python3
@@ -112,7 +150,7 @@ def test_full_fetches_what_the_experiments_use_and_goes_on_without_a_network(pro
 def test_a_run_that_is_not_full_and_tests_fetch_nothing(project):
     (project.root / "datasets" / "fetch").write_text(FETCH)
     assert project.run("--only", "scenes")[0] == 0
-    assert project.run("test", "--full")[0] == 0
+    assert project.run("test")[0] == 0
     assert not (project.root / "datasets" / "fetched").exists()
 
 
@@ -146,6 +184,20 @@ def test_missing_packages_are_installed_without_questions(project, uid, prefix):
     assert re.search(r"apt-get -y .* update DEBIAN_FRONTEND=noninteractive", log)
     assert re.search(r"apt-get -y .* install --no-install-recommends g\+\+ cmake DEBIAN_FRONT", log)
     assert prefix in log and ("sudo" in log) == bool(prefix)
+
+
+def test_nothing_made_is_said_before_python_is_asked(project):
+    line = f"Error: no finished run in {project.results}; run ./reproduce.sh first\n"
+    assert project.run("--verify", STUB_MISSING="python3-yaml") == (1, line)
+    assert not project.results.exists()
+
+
+def test_what_was_made_elsewhere_is_verified_with_the_packages_of_a_run(project):
+    run = project.results / "raw" / "fig2" / "run.json"
+    run.parent.mkdir(parents=True)
+    run.touch()
+    code, output = project.run("--verify", STUB_MISSING="python3-yaml", STUB_UID="1000", STUB_NO_SUDO="1")
+    assert code == 1 and f"{APT_LINE}python3-yaml\n" in output
 
 
 def test_a_failing_apt_names_its_log(project):
@@ -219,3 +271,24 @@ def test_clean_keeps_the_reference_and_the_sources(project):
     assert reference.exists()
     assert not project.bin.exists() and not (project.root / "datasets" / "generated").exists()
     assert (project.root / "datasets" / "debian_pairs.py").exists()
+
+
+def test_clean_leaves_alone_what_a_run_is_making(project):
+    lock = project.results / ".lock"
+    lock.parent.mkdir()
+    project.bin.mkdir(parents=True)
+    with lock.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        code, output = project.run("--clean")
+        assert (code, output) == (1, f"Error: a run is at work in {project.results}; nothing was removed\n")
+        assert lock.exists() and project.bin.exists()
+    assert project.run("--clean")[0] == 0
+    assert not lock.exists() and not project.bin.exists()
+
+
+def test_clean_says_what_it_could_not_remove(project, programs):
+    (project.results / "tables").mkdir(parents=True)
+    refusal = "rm: cannot remove 'results/tables/table1.csv': Permission denied"
+    write_program(programs / "rm", f"""[[ $* != *results/tables* ]] || {{ echo "{refusal}" >&2; exit 1; }}""")
+    code, output = project.run("--clean", PATH=f"{programs}:/usr/bin:/bin")
+    assert (code, output) == (1, f"Error: not everything could be removed: {refusal}\n")

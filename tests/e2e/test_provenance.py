@@ -4,23 +4,17 @@ import json
 import os
 import random
 import shutil
-import signal
 import subprocess
 import time
 
 import pytest
 
 from conftest import HERE, Project
+from same_results import end, made
 
 # Of each kind of job one and more: programs, scores, tables and figures, and a search with a database.
 STAGES = ["table1", "fig2", "odometry", "table3_vio", "tune_tiny", "scenes"]
 MOMENTS = 10
-
-
-def made(project):
-    """The bytes of all tables and figures, but for those that say how long something took."""
-    files = [path for folder in ("tables", "figures") for path in (project.results / folder).iterdir()]
-    return {path.name: path.read_bytes() for path in files if not path.name.endswith("_timings.csv")}
 
 
 def recorded(project):
@@ -99,7 +93,7 @@ def test_slurm_makes_the_same_tables_and_goes_on_after_a_kill(project, tmp_path,
     assert queue(slurm), "jobs stay in the queue"
     code, output = other.run("--cluster", "slurm", "--only", *stages, **slurm)
     assert code == 0, output
-    assert made(other) == made(project)
+    assert made(other.results) == made(project.results)
     assert sorted(recorded(other)) == sorted(recorded(project)) and not queue(slurm)
 
 
@@ -118,12 +112,6 @@ def test_without_a_cluster_it_says_so(project):
     assert code == 1 and ("slurm.conf" in output or "is not installed" in output)
 
 
-def end(process, whole_group):
-    """Kills reproduce.sh alone, or with all that it has started; what is left can go on printing."""
-    (os.killpg if whole_group else os.kill)(process.pid, signal.SIGKILL)
-    process.wait(timeout=60)
-
-
 @pytest.mark.parametrize("moment", range(MOMENTS))
 def test_killed_at_a_random_moment_it_makes_the_same_when_started_again(moment, undisturbed, tmp_path):
     wanted, seconds = undisturbed
@@ -136,7 +124,7 @@ def test_killed_at_a_random_moment_it_makes_the_same_when_started_again(moment, 
     code, output = project.run("--only", *STAGES)
     process.stdout.close()
     assert code == 0, output
-    assert made(project) == wanted
+    assert made(project.results) == wanted
     assert {run["exit"]["state"] for run in recorded(project).values()} == {"done"}
 
 
@@ -147,4 +135,4 @@ def undisturbed(tmp_path_factory):
     started = time.monotonic()
     code, output = project.run("--only", *STAGES, SGF_FAKE_SECONDS="0.1")
     assert code == 0, output
-    return made(project), time.monotonic() - started
+    return made(project.results), time.monotonic() - started

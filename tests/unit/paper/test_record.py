@@ -157,6 +157,9 @@ def test_the_code_is_a_commit_and_what_differs_from_it(tmp_path, monkeypatch):
     project.mkdir()
     monkeypatch.setattr(record, "PROJECT", project)
     assert record.describe_code(diffs) == {"commit": "unknown", "diff": ""}
+    (project / "REVISION").write_text("1234-dirty\n")
+    assert record.describe_code(diffs) == {"commit": "1234-dirty", "diff": ""}
+    (project / "REVISION").unlink()
     git(project, "init")
     (project / "code").write_text("1\n")
     git(project, "add", "code")
