@@ -143,7 +143,7 @@ def changed_conditions(run: Recorded, results: Path) -> list[str]:
     os.chdir(results)  # inputs are on record by their paths from there
     try:
         inputs = [Path(name) for name in run.node["inputs"]]
-        now = record.conditions([*map(Path, run.node["command"][:1]), *inputs], inputs)
+        now = record.conditions(inputs)
     finally:
         os.chdir(here)
     return [name for name in CONDITIONS if now[name] != run.node[name]]

@@ -20,7 +20,7 @@ def sha256(text):
 @pytest.fixture
 def results(tmp_path, monkeypatch):
     """Results where every run has been recorded under conditions NOW, which still hold."""
-    monkeypatch.setattr(record, "conditions", lambda programs, inputs: NOW)
+    monkeypatch.setattr(record, "conditions", lambda inputs: NOW)
     (tmp_path / "results").mkdir()
     return tmp_path / "results"
 
