@@ -188,37 +188,41 @@ def describe_build(files: list[Path]) -> dict[str, str]:
     return node if isinstance(node, dict) else {}
 
 
-def conditions(programs: list[Path], inputs: list[Path]) -> dict[str, Any]:
+def conditions(inputs: list[Path]) -> dict[str, Any]:
     """All that a result depends on, besides the command: as it is now, in the results as working directory.
 
-    @param programs where to look for those of the build.
+    @param inputs what is read, programs of the build included.
     """
     return {
         "code": describe_code(DIFFS),
         "inputs": hash_each(inputs, CACHE),
         "packages": describe_packages(),
         "processor": describe_processor(),
-        "build": describe_build(programs),
+        "build": describe_build(inputs),
     }
 
 
 def find_options(outputs: list[Path], inputs: list[Path]) -> dict[str, Any]:
-    """All options of a run: the file that its program left of them, or else what it was given."""
+    """All options of a run: the file that its program left of them, or else the files it was given, by their names."""
     beside = [path / "options.yaml" for path in outputs]
     beside += [path.with_suffix(".options.yaml") for path in outputs]
     beside += [path.with_name("options.yaml") for path in outputs if path.name == "trajectory.txt"]
-    given = [path for path in inputs if path.parent.name in ("experiments", "synthetic")]
-    for path in [*beside, *given[:1]]:
+    for path in beside:
         if path.is_file():
             return yaml.safe_load(path.read_text()) or {}
-    return {}
+    given = [path for path in inputs if path.parent.name in ("experiments", "synthetic") and path.is_file()]
+    return {path.stem: yaml.safe_load(path.read_text()) for path in given}
 
 
 def find_seeds(options: Any, command: list[str], prefix: str = "") -> dict[str, Any]:
-    """All options called `seed` by their dotted names, and flags of a command that end so."""
+    """All options whose names end in `seed`, by their dotted names, and flags of a command that end so."""
+    items = enumerate(options) if isinstance(options, list) else options.items() if isinstance(options, dict) else []
     found = {}
-    for key, value in options.items() if isinstance(options, dict) else []:
-        found |= {f"{prefix}{key}": value} if key == "seed" else find_seeds(value, [], f"{prefix}{key}.")
+    for key, value in items:
+        if isinstance(value, (dict, list)):
+            found |= find_seeds(value, [], f"{prefix}{key}.")
+        elif str(key).endswith("seed"):
+            found[f"{prefix}{key}"] = value
     for flag, value in zip(command, command[1:]):
         if flag.startswith("--") and flag.endswith("seed"):
             found[flag] = value
@@ -247,7 +251,7 @@ class Run:
         self.node = {
             "rule": self.arguments.rule,
             "command": self.command,
-            **conditions([Path(self.command[0]), *self.arguments.inputs], self.arguments.inputs),
+            **conditions(self.arguments.inputs),
         }
 
     def start(self) -> subprocess.Popen:

@@ -301,7 +301,7 @@ def main() -> int:
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]
         return 0 if make_stages(settings, stages) else 1
-    except (RunError, cluster.ClusterError, config.ConfigError) as error:
+    except (RunError, cluster.ClusterError, config.ConfigError, OSError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

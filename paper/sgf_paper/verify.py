@@ -3,7 +3,8 @@
 One run of each rule is drawn, as many as fit into the time. A run is repeated in a folder of its own, which shows
 it the results as they lie there. If code, inputs, packages, processor and build are those on record, its files
 have to be the same bits; if not, what differs is said, and numbers have to agree within paper/tolerances.yaml.
-Exit code 0 if all that was repeated agrees, 1 if anything does not or nothing was there to repeat.
+Pictures and documents have other bits then and no numbers: of a run that makes no more, nothing is compared.
+Exit code 0 if all that was compared agrees, 1 if anything does not or nothing was there to repeat or to compare.
 """
 
 from __future__ import annotations
@@ -26,10 +27,14 @@ from typing import Any
 from sgf_paper import config, record
 from sgf_paper import run as run_module
 from sgf_paper.progress import clock
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
 CONDITIONS = ("code", "inputs", "packages", "processor", "build")
 TIMED = re.compile(r"timings?\b|_timings\.|bench_")  # files that say how long something took
-PICTURES = (".png", ".pdf", ".ply", ".pfm", ".db")
+# Files that are made of what is compared elsewhere, or that say what a run was told.
+WITHOUT_VALUES = re.compile(r".*\.(png|pdf|ply|pfm|md|tex|html)|(.*\.)?options\.yaml")
+CONDITIONS_IN_YAML = ("build", "data", "optuna")  # keys that say what a file was made with
+NOTHING = "nothing to compare"
 TOLERANCES = config.PAPER / "tolerances.yaml"
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
@@ -65,9 +70,14 @@ class Recorded:
         """What it made, but for files that are about time."""
         return [name for name in self.node.get("outputs", {}) if not TIMED.search(Path(name).name)]
 
+    @property
+    def valued(self) -> list[str]:
+        """Those of the files compared that hold values."""
+        return [name for name in self.compared if not WITHOUT_VALUES.fullmatch(Path(name).name)]
+
 
 def load_tolerances() -> list[Tolerance]:
-    return [Tolerance(**node) for node in config.read_yaml(TOLERANCES)["tolerances"]]
+    return [Tolerance(**node) for node in read_yaml(TOLERANCES)["tolerances"]]
 
 
 # --- the sample -----------------------------------------------------------------------------------
@@ -110,12 +120,13 @@ def draw_sample(runs: list[Recorded], seed: int, seconds: float) -> list[Recorde
 def show_results(results: Path, shown: Path, outputs: list[Path]) -> None:
     """Fills a folder with what is in the results but for some outputs.
 
-    Folders that outputs go to are copied, and with them the files beside the outputs; all else is linked.
+    Folders that outputs go to are copied, and with them the files beside the outputs; all else is linked. A
+    database of trials is not among them: a search that finds its trials done would repeat none of them.
     """
     shown.mkdir(exist_ok=True)
     for path in results.iterdir():
         below = [output for output in outputs if path == output or path in output.parents]
-        if path.name == ".cache" or path in outputs:
+        if path.name == ".cache" or path.suffix == ".db" or path in outputs:
             continue
         if below and path.is_dir():
             show_results(path, shown / path.name, below)
@@ -143,7 +154,7 @@ def changed_conditions(run: Recorded, results: Path) -> list[str]:
     os.chdir(results)  # inputs are on record by their paths from there
     try:
         inputs = [Path(name) for name in run.node["inputs"]]
-        now = record.conditions([*map(Path, run.node["command"][:1]), *inputs], inputs)
+        now = record.conditions(inputs)
     finally:
         os.chdir(here)
     return [name for name in CONDITIONS if now[name] != run.node[name]]
@@ -153,7 +164,7 @@ def changed_conditions(run: Recorded, results: Path) -> list[str]:
 
 
 def _flatten(node: Any, name: str = "") -> list[tuple[str, str]]:
-    """The values of a JSON file with their dotted keys; items of lists have their list's."""
+    """The values of a JSON or YAML file with their dotted keys; items of lists have their list's."""
     if isinstance(node, dict):
         return [pair for key, value in node.items() for pair in _flatten(value, f"{name}.{key}".strip("."))]
     if isinstance(node, list):
@@ -166,6 +177,9 @@ def read_values(path: Path) -> list[tuple[str, str]]:
     text = path.read_text()
     if path.suffix == ".json":
         return _flatten(json.loads(text))
+    if path.suffix == ".yaml":
+        node = read_yaml(path)
+        return _flatten({key: value for key, value in node.items() if key not in CONDITIONS_IN_YAML})
     if path.suffix == ".csv":
         header, *lines = list(csv.reader(text.splitlines())) or [[]]
         return [pair for line in lines for pair in zip(header, line)] + [("", name) for name in header]
@@ -184,9 +198,10 @@ def agree(file: str, name: str, a: str, b: str, tolerances: list[Tolerance]) -> 
 
 def differences(file: str, old: Path, new: Path, tolerances: list[Tolerance]) -> str:
     """What tells two files apart beyond the tolerances; empty if nothing does."""
-    if Path(file).suffix in PICTURES or Path(file).suffix in (".md", ".tex", ".yaml"):
-        return ""  # made of what is compared elsewhere
-    before, after = read_values(old), read_values(new)
+    try:
+        before, after = read_values(old), read_values(new)
+    except (ValueError, ConfigError) as error:
+        return f"{file}: cannot be read: {error}"
     if len(before) != len(after):
         return f"{file}: {len(after)} values in place of {len(before)}"
     for (name, a), (_, b) in zip(before, after):
@@ -206,11 +221,14 @@ def compare(run: Recorded, results: Path, scratch: Path, changed: list[str]) -> 
         return "same bits", ""
     if not changed:
         return "DIFFERS", f"other bits: {', '.join(other[:3])}"
-    gone = [name for name in other if not (results / name).exists()]
+    if not run.valued:
+        return NOTHING, f"other bits: {', '.join(other[:3])}"
+    unlike = [name for name in run.valued if name in other]
+    gone = [name for name in unlike if not (results / name).exists()]
     if gone:
         return "DIFFERS", f"{gone[0]} is gone from the results"
     tolerances = load_tolerances()
-    texts = [differences(name, results / name, scratch / name, tolerances) for name in other]
+    texts = [differences(name, results / name, scratch / name, tolerances) for name in unlike]
     found = next(filter(None, texts), "")
     return ("DIFFERS", found) if found else ("within tolerances", "")
 
@@ -230,7 +248,7 @@ def verify_run(run: Recorded, results: Path) -> tuple[str, str]:
 
 
 def verify(results: Path, seed: int, minutes: float) -> bool:
-    """Repeats a sample and prints a line for each run; whether all agree.
+    """Repeats a sample and prints a line for each run; whether all agree that could be compared, and any could.
 
     @throws RunError if there is nothing to repeat, or while another run is at work.
     """
@@ -241,15 +259,15 @@ def verify(results: Path, seed: int, minutes: float) -> bool:
     if not sample:
         raise run_module.RunError(f"no finished run in {results} can be repeated; run ./reproduce.sh first")
     print(f"== verify: {len(sample)} of {len(runs)} runs, seed {seed}", flush=True)
-    passed = True
+    words = set()
     for run in sample:
         word, what = verify_run(run, results)
-        passed = passed and word != "DIFFERS"
+        words.add(word)
         name = run.folder.relative_to(results)
         print(f"  {run.rule:18} {word:18} {clock(run.wall_s):>7}  {name}{f' ({what})' if what else ''}", flush=True)
     left = sorted({run.rule for run in runs} - {run.rule for run in sample})
     print(f"  Left out, as they take longer: {', '.join(left) or 'none'}", flush=True)
-    return passed
+    return "DIFFERS" not in words and words != {NOTHING}
 
 
 def main() -> int:
@@ -260,9 +278,12 @@ def main() -> int:
     arguments = parser.parse_args()
     try:
         return 0 if verify(arguments.results.resolve(), arguments.seed, arguments.minutes) else 1
-    except run_module.RunError as error:
+    except (run_module.RunError, ConfigError, OSError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1
+    except KeyboardInterrupt:
+        print("Interrupted.", file=sys.stderr)
+        return 130
 
 
 if __name__ == "__main__":

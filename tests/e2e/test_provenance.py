@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 
@@ -35,11 +36,34 @@ def test_each_run_leaves_what_it_was_made_of_and_can_be_verified(project):
     sequence = project.root / "datasets" / "generated" / "sequences" / "MH_03_medium"
     assert set(run["inputs"]) >= {str(project.bin / "sgf_vio"), str(sequence)}
     assert {run["rule"] for run in runs.values()} >= {"scores", "table", "tuned_column", "pairs", "tracking_scores"}
+    searched = len(project.flights())
     code, output = project.run("--verify")
     assert code == 0, output
+    assert len(project.flights()) > searched + 3, "the trials of a search are made again"
     for rule in ("scores", "table", "odometry", "tracking_run", "tracking_scores", "tuned_column", "contact_sheet"):
         assert f"\n  {rule:18} same bits " in output, output
     assert "DIFFERS" not in output and "within tolerances" not in output
+
+
+def test_every_program_of_a_map_the_benchmark_and_the_report_are_on_record(project):
+    code, output = project.run("--only", "fig6", "mrpt_map", "bench_stereo", "report")
+    assert code == 0, output
+    runs = recorded(project)
+    scored = [node for node in runs.values() if node["rule"] in ("direct_map_scores", "mrpt_map_scores")]
+    assert scored and all(Path(name).exists() for node in scored for name in node["command"][:1])
+    made = {Path(name).name for node in scored for name in node["outputs"]}
+    assert made == {"body.txt", "map.ply", "scores.json"}
+    converted = [node["command"] for node in runs.values() if node["rule"] == "mrpt_map_rawlog"]
+    assert converted and all(command[command.index("-n") + 1].isdigit() for command in converted)
+    (benchmark,) = [node for node in runs.values() if node["rule"] == "benchmark_run"]
+    assert any(word.startswith("SGF_BENCH_PAIR=/") for word in benchmark["command"])
+    report = runs["runs/report.html"]
+    assert {"tables/fig6.csv", "figures/fig6.png", "tables/bench_stereo.md"} <= set(report["inputs"])
+    assert {"report.html", "tables/report_values.csv"} <= set(report["outputs"])
+    code, output = project.run("--verify")
+    assert code == 0, output
+    for rule in ("direct_map_run", "direct_map_scores", "mrpt_map_scores", "write_report"):
+        assert f"\n  {rule:18} same bits " in output, output
 
 
 def test_what_cannot_be_repeated_alike_is_found(project):

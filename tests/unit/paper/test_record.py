@@ -82,6 +82,25 @@ def test_a_run_leaves_what_it_depends_on_and_two_equal_runs_the_same_bytes(run, 
     assert (tmp_path / "out" / "run.json").read_bytes() == first
 
 
+def test_of_a_program_that_notes_none_the_options_are_all_files_it_was_given(run, tmp_path):
+    sequence = "seed: 1\nimu: {seed: 101}\nshake: {shake_seed: 9}\n"
+    recipes = {"MH_01": sequence, "pairs": "pairs: [{seed: 5}, {seed: 6}]\n"}
+    (tmp_path / "synthetic").mkdir()
+    for name, text in recipes.items():
+        (tmp_path / "synthetic" / f"{name}.yaml").write_text(text)
+    files = [f"synthetic/{name}.yaml" for name in recipes]
+    assert run("rule", "out", "--inputs", *files, "other", "--", "true")[0] == 0
+    node = read(tmp_path / "out")
+    assert node["options"]["MH_01"]["imu"] == {"seed": 101} and len(node["options"]["pairs"]["pairs"]) == 2
+    seeds = {"MH_01.seed": 1, "MH_01.imu.seed": 101, "MH_01.shake.shake_seed": 9}
+    assert node["seeds"] == seeds | {"pairs.pairs.0.seed": 5, "pairs.pairs.1.seed": 6}
+
+
+def test_the_build_is_asked_of_what_was_read_not_of_what_lies_beside_the_interpreter(run, program, tmp_path):
+    assert run("rule", "out", "--", program, "out")[0] == 0
+    assert read(tmp_path / "out")["build"] == {}
+
+
 def test_time_and_memory_are_in_a_file_of_their_own(run, tmp_path):
     code = "b = bytearray(80 << 20)\nfor i in range(2000000): pass"
     assert run("rule", "out", "--", sys.executable, "-c", code)[0] == 0

@@ -6,11 +6,12 @@ import sys
 
 import pytest
 
-from sgf_paper import record, verify
+from sgf_paper import record, run, verify
 from sgf_paper.verify import Recorded, Tolerance
 
 NOW = {"code": {}, "inputs": {}, "packages": {"libc6": "2.36"}, "processor": {"model": "x"}, "build": {}}
-WRITER = "import pathlib, sys; pathlib.Path('raw/a/scores.csv').write_text(sys.argv[1])"
+WRITER = "import pathlib, sys; pathlib.Path('raw/a', sys.argv[2]).write_text(sys.argv[1])"
+TUNED = "build: {{revision: {build}}}\nfolds:\n- parameters: {{sigma: {sigma}}}\n  training: {{tuned_pct: {error}}}\n"
 
 
 def sha256(text):
@@ -20,7 +21,7 @@ def sha256(text):
 @pytest.fixture
 def results(tmp_path, monkeypatch):
     """Results where every run has been recorded under conditions NOW, which still hold."""
-    monkeypatch.setattr(record, "conditions", lambda programs, inputs: NOW)
+    monkeypatch.setattr(record, "conditions", lambda inputs: NOW)
     (tmp_path / "results").mkdir()
     return tmp_path / "results"
 
@@ -29,12 +30,15 @@ def results(tmp_path, monkeypatch):
 def add(results):
     """Adds a run that wrote some text, and says now that it writes another."""
 
-    def add(text="mean_px\n1.00\n", again=None, rule="scores", wall_s=1.0, folder="runs/a", state="done", **changed):
+    def add(
+        text="mean_px\n1.00\n", again=None, file="scores.csv", rule="scores", wall_s=1.0, folder="runs/a", state="done",
+        **changed,
+    ):  # fmt: skip
         (results / "raw" / "a").mkdir(parents=True, exist_ok=True)
-        (results / "raw" / "a" / "scores.csv").write_text(text)
+        (results / "raw" / "a" / file).write_text(text)
         (results / "raw" / "a" / "beside").write_text("1")
-        node = {"rule": rule, "command": [sys.executable, "-c", WRITER, again or text], **NOW, **changed}
-        node |= {"outputs": {"raw/a/scores.csv": sha256(text)}, "exit": {"state": state}}
+        node = {"rule": rule, "command": [sys.executable, "-c", WRITER, again or text, file], **NOW, **changed}
+        node |= {"outputs": {f"raw/a/{file}": sha256(text)}, "exit": {"state": state}}
         record.write_json(results / folder / "run.json", node)
         record.write_json(results / folder / "timing.json", {"wall_s": wall_s})
 
@@ -68,6 +72,33 @@ def test_under_other_conditions_numbers_have_tolerances(results, add, again, wor
     assert outcome(results) == (word, what)
 
 
+@pytest.mark.parametrize(
+    "again, word, what",
+    [
+        ({"sigma": 2, "error": 0.5, "build": "b"}, "within tolerances", ""),
+        ({"sigma": 2, "error": 0.51}, "within tolerances", ""),
+        ({"sigma": 3, "error": 0.5}, "DIFFERS", "raw/a/sgf.yaml: folds.parameters.sigma 3 in place of 2; "),
+        ({"sigma": 2, "error": 0.9}, "DIFFERS", "raw/a/sgf.yaml: folds.training.tuned_pct 0.9 in place of 0.5; "),
+        ({"sigma": "[", "error": 0.9}, "DIFFERS", "raw/a/sgf.yaml: cannot be read: "),
+    ],
+)
+def test_what_a_search_found_is_compared_but_for_what_it_was_made_with(results, add, again, word, what):
+    first = TUNED.format(build="a", sigma=2, error=0.5)
+    add(first, TUNED.format(**{"build": "a", **again}), "sgf.yaml", packages={"libc6": "2.35"})
+    found = outcome(results)
+    assert found[0] == word and found[1].startswith(what) and found[1].endswith("other packages")
+
+
+def test_of_pictures_other_bits_are_not_said_to_agree(results, add, capsys, monkeypatch):
+    monkeypatch.setattr(run, "lock", lambda folder: None)  # which would hold it to the end of this process
+    add("1", "2", "a.png", packages={"libc6": "2.35"})
+    assert outcome(results) == ("nothing to compare", "other bits: raw/a/a.png; other packages")
+    assert not verify.verify(results, seed=1, minutes=10)
+    add("x\n1\n", rule="table", folder="runs/b")
+    assert verify.verify(results, seed=1, minutes=10)
+    assert "nothing to compare" in capsys.readouterr().out
+
+
 def test_a_command_that_fails_differs_and_says_why(results, add):
     add(state="done")
     node = json.loads((results / "runs/a/run.json").read_text())
@@ -96,15 +127,15 @@ def test_only_runs_that_ended_well_and_made_more_than_timings_are_repeated(resul
         assert verify.find_recorded(results) == []
 
 
-def test_files_beside_an_output_are_copied_and_the_rest_is_linked(results, tmp_path):
-    for name in ("raw/a/out", "raw/a/study.db", "raw/b/other", ".cache/x"):
+def test_files_beside_an_output_are_copied_but_for_trials_and_the_rest_is_linked(results, tmp_path):
+    for name in ("raw/a/out", "raw/a/beside", "raw/a/study.db", "raw/b/other", ".cache/x"):
         (results / name).parent.mkdir(parents=True, exist_ok=True)
         (results / name).write_text("1")
     shown = tmp_path / "shown"
     verify.show_results(results, shown, [results / "raw" / "a" / "out"])
-    assert not (shown / "raw/a/out").exists() and not (shown / ".cache").exists()
-    (shown / "raw/a/study.db").write_text("2")
-    assert (results / "raw/a/study.db").read_text() == "1"
+    assert not any((shown / name).exists() for name in ("raw/a/out", "raw/a/study.db", ".cache"))
+    (shown / "raw/a/beside").write_text("2")
+    assert (results / "raw/a/beside").read_text() == "1"
     assert (shown / "raw/b").is_symlink() and (shown / "raw/b/other").read_text() == "1"
 
 
@@ -139,3 +170,13 @@ def test_where_nothing_was_run_it_says_so(tmp_path, capsys, monkeypatch, exists)
     monkeypatch.setattr(sys, "argv", ["verify", "--results", str(results)])
     assert verify.main() == 1
     assert "no finished run" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("main, words", [(verify.main, []), (run.main, ["--bin", "none", "table1"])])
+def test_a_folder_that_cannot_be_locked_is_an_error_in_a_line(results, capsys, monkeypatch, main, words):
+    (results / ".lock").mkdir()
+    monkeypatch.setattr(run.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(sys, "argv", ["main", "--results", str(results), *words])
+    assert main() == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("Error: ") and str(results / ".lock") in line
