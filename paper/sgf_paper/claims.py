@@ -7,7 +7,7 @@ fail: what is not there, too little for a verdict, or level is never taken for a
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from sgf_paper import pairs
 from sgf_paper.config import Check, Claim, Interval, Ordering, Paired, Value
 from sgf_paper.pairs import Rule
 
+FIRST_LINE = 2  # of a CSV file, after its header
 HOLDS, FAILS, OPEN, FEW, MISSING = "holds", "does not hold", "undecided", "too few", "not measured"
 REPRODUCED, PARTLY, NOT, UNDECIDED, NOT_MEASURED = "reproduced", "partly", "not", "undecided", "not measured"
 THIS_RUN, REFERENCE = "this run", "reference run"
@@ -34,6 +35,18 @@ class Outcome:
     state: str
     number: str  # why: the values
     table: str
+    lines: tuple[int, ...] = ()  # of the table's file that it rests on
+
+    @property
+    def lines_text(self) -> str:
+        """The lines as ranges."""
+        ranges: list[list[int]] = []
+        for line in self.lines:
+            if ranges and ranges[-1][-1] == line - 1:
+                ranges[-1] = [ranges[-1][0], line]
+            else:
+                ranges.append([line])
+        return ", ".join("–".join(map(str, ends)) for ends in ranges)
 
 
 @dataclass(frozen=True)
@@ -86,6 +99,13 @@ def require_columns(lines: pd.DataFrame, columns: Iterable[str], table: str) -> 
         raise ClaimError(f"table {table} has no column {', '.join(unknown)}")
 
 
+def _numbers_of(check: Check, lines: pd.DataFrame) -> tuple[int, ...]:
+    """Where in the table's file the lines are that a check compares."""
+    if isinstance(check, (Ordering, Paired)):
+        lines = lines[lines[check.method].isin([check.best, *check.among])]
+    return tuple(lines.index + FIRST_LINE)
+
+
 def shown(value: float) -> str:
     return (f"{value:.0f}" if abs(value) >= 1000 else f"{value:.4g}").replace("inf", "∞")
 
@@ -132,7 +152,8 @@ def _pair(check: Paired, where: str, lines: pd.DataFrame, rule: Rule) -> list[Ou
         state = {"better": HOLDS, "worse": FAILS, "equal": FAILS}.get(result.verdict, OPEN)
         p = pairs.sign_flip_p(wide) if result.enough and result.pairs == result.clusters else float("nan")
         number = f"{result}" + (f", sign-flip p = {p:.2g}" if p == p else "")
-        outcomes.append(Outcome(place, state if result.enough else FEW, number, check.table))
+        numbers = _numbers_of(replace(check, among=[other]), lines)
+        outcomes.append(Outcome(place, state if result.enough else FEW, number, check.table, numbers))
     return outcomes
 
 
@@ -140,15 +161,17 @@ def _intervals(check: Interval, where: str, lines: pd.DataFrame, rule: Rule) -> 
     if len(lines) != 1:
         raise ClaimError(f"table {check.table} has {len(lines)} lines ({where}) where an interval is one")
     line = lines.iloc[0]
-    low, high, count = line[check.low], line[check.high], int(line[check.count])
-    number = f"{shown(line[check.estimate])} [{shown(low)}, {shown(high)}], {check.count}: {count}"
+    low, high = line[check.low], line[check.high]
+    counts = {name: int(line[name]) for name in check.counts}
+    number = f"{shown(line[check.estimate])} [{shown(low)}, {shown(high)}]"
+    number += "".join(f", {name}: {count}" for name, count in counts.items())
     if pd.isna(low):
         return [Outcome(where, MISSING, "no pair that does not fail twice", check.table)]
     if check.above is not None:
         state = HOLDS if low > check.above else FAILS if high <= check.above else OPEN
     else:
         state = HOLDS if high < check.below else FAILS if low >= check.below else OPEN
-    return [Outcome(where, state if count >= rule.least else FEW, number, check.table)]
+    return [Outcome(where, state if min(counts.values()) >= rule.least else FEW, number, check.table)]
 
 
 def _limits(check: Value, where: str, lines: pd.DataFrame, rule: Rule) -> list[Outcome]:
@@ -173,7 +196,7 @@ JUDGES: dict[type, Callable[[Any, str, pd.DataFrame, Rule], list[Outcome]]] = {
 def _columns_of(check: Check) -> list[str]:
     """Columns that a check reads of its table."""
     names = ("method", "quantity", "estimate", "low", "high", "count")
-    return [*check.groups, *filter(None, (getattr(check, name, "") for name in names))]
+    return [*check.groups, *getattr(check, "counts", []), *filter(None, (getattr(check, name, "") for name in names))]
 
 
 def judge_check(check: Check, tables: Callable[[str], pd.DataFrame | None], rule: Rule) -> list[Outcome]:
@@ -186,7 +209,11 @@ def judge_check(check: Check, tables: Callable[[str], pd.DataFrame | None], rule
     if lines.empty:
         return [Outcome("", MISSING, f"table {check.table} has no such line: {_where_text(check.where)}", check.table)]
     judge = JUDGES[type(check)]
-    return [o for where, own in pairs.group(lines, check.groups) for o in judge(check, where, own, rule)]
+    return [
+        outcome if outcome.lines else replace(outcome, lines=_numbers_of(check, own))
+        for where, own in pairs.group(lines, check.groups)
+        for outcome in judge(check, where, own, rule)
+    ]
 
 
 def _where_text(where: dict[str, Any]) -> str:

@@ -13,7 +13,10 @@ from sgf_paper.config import Comparison, ConfigError, JoinedTable, SelfMatch, Ta
 
 PASS, NEAR, FAIL, NO_MARK = "pass", "near", "fail", "–"
 KEYS = ["table", "part", "row", "column", "quantity"]
-ROW = [*KEYS, "published", "measured", "size", "pass_within", "near_within", "mark", "reason", "tolerance"]
+ROW = [
+    *KEYS, "published", "measured", "size", "runs", "measured_by", "pass_within", "near_within", "mark", "reason",
+    "tolerance",
+]  # fmt: skip
 AVERAGED = "table_3_euroc_ate_m"
 NAN = float("nan")
 Tables = Callable[[str], "pd.DataFrame | None"]
@@ -31,6 +34,8 @@ class Value:
     measured: float
     size: int  # scenes, sequences or frames that the measured value is of
     reason: str = ""  # why there is none
+    runs: int = 0  # of each sequence, where runs are repeated
+    measured_by: str = ""  # the system of Table III that it is of
 
 
 def _stereo_values(table: Table, lines: pd.DataFrame | None) -> Iterator[Value]:
@@ -63,13 +68,19 @@ def _joined_values(joined: JoinedTable, lines: pd.DataFrame | None) -> Iterator[
                for name, column in part.columns.items() if column.published}  # fmt: skip
     labels = {sequence.published: sequence.euroc_name for sequence in joined.sequences if sequence.published}
     for row, values in config.load_published_rows(joined.rule).items():
-        measured = _measured_errors(lines, [systems.get(row, row), row])
-        errors = {label: measured.get(labels.get(label), NAN) for label in values if label != "avg"}
-        errors["avg"] = pd.Series(errors).mean(skipna=False)
+        system, measured = _measured_errors(lines, [systems.get(row, row), row])
+        of_labels = measured.reindex([labels.get(label) for label in values if label != "avg"])
+        of_labels.index = [label for label in values if label != "avg"]
+        errors = {**of_labels["measured"], "avg": of_labels["measured"].mean(skipna=False)}
+        runs = {**of_labels["runs"], "avg": of_labels["runs"].min()}
         why = f"{joined.name} was not made" if lines is None else _why_no_error(row, systems)
         for label, published in values.items():
-            size = 0 if errors[label] != errors[label] else len(errors) - 1 if label == "avg" else 1
-            yield Value("", row, label, "ate_mean_m", published, errors[label], size, "" if size else why)
+            key = ("", row, label, "ate_mean_m", published)
+            if errors[label] != errors[label]:
+                yield Value(*key, NAN, 0, why)
+            else:
+                size = len(of_labels) if label == "avg" else 1
+                yield Value(*key, errors[label], size, runs=int(runs[label]), measured_by=system)
 
 
 def _why_no_error(row: str, systems: dict[str, str]) -> str:
@@ -78,16 +89,15 @@ def _why_no_error(row: str, systems: dict[str, str]) -> str:
     return "a program of others: no trajectory of it below results/external"
 
 
-def _measured_errors(lines: pd.DataFrame | None, systems: list[str]) -> dict[str, float]:
-    """Mean errors on EuRoC's whole sequences, of the first of the systems that has any."""
+def _measured_errors(lines: pd.DataFrame | None, systems: list[str]) -> tuple[str, pd.DataFrame]:
+    """The first of the systems that has any error on EuRoC's whole sequences; its mean errors and runs by sequence."""
+    nothing = "", pd.DataFrame(columns=["measured", "runs"], dtype=float)
     if lines is None:
-        return {}
+        return nothing
     own = lines[(lines["dataset"] == "euroc") & (lines["quantity"] == "ate_mean_m")].dropna(subset="measured")
-    for system in systems:
-        found = own[own["system"] == system]
-        if not found.empty:
-            return dict(zip(found["sequence"], found["measured"]))
-    return {}
+    found = ((system, own[own["system"] == system]) for system in systems)
+    every = ((system, errors.set_index("sequence")[["measured", "runs"]]) for system, errors in found if len(errors))
+    return next(every, nothing)
 
 
 def _self_match_values(figure: SelfMatch, lines: pd.DataFrame | None) -> Iterator[Value]:
@@ -132,7 +142,9 @@ def mark(comparison: Comparison, value: Value, tolerance: Tolerance) -> tuple[st
     if value.measured != value.measured:
         return NO_MARK, value.reason
     if value.size < comparison.size:
-        return NO_MARK, f"{value.size} of {comparison.size} are at hand"
+        return NO_MARK, f"{value.size} of {comparison.size} have a value"
+    if value.runs < comparison.least_runs:
+        return NO_MARK, f"{value.runs} run{'' if value.runs == 1 else 's'}; {comparison.runs_reason}"
     off = abs(value.measured - value.published)
     for name in (PASS, NEAR):
         if off <= _allowed(tolerance, name, value.published):
@@ -156,7 +168,8 @@ def compare(tables: Tables) -> pd.DataFrame:
             lines.append({
                 "table": experiment.name, "part": value.part, "row": value.row, "column": value.column,
                 "quantity": value.quantity, "published": value.published, "measured": value.measured,
-                "size": value.size, "pass_within": _allowed(tolerance, PASS, value.published),
+                "size": value.size, "runs": value.runs, "measured_by": value.measured_by,
+                "pass_within": _allowed(tolerance, PASS, value.published),
                 "near_within": _allowed(tolerance, NEAR, value.published), "mark": word, "reason": reason,
                 "tolerance": tolerance.reason,
             })  # fmt: skip

@@ -485,6 +485,8 @@ class RepeatedRuns(SequenceExperiment, ABC):
     lost_below_pct: float  # frames with a pose
     compared: list[str]
     baselines: list[str]
+    verdict_runs: int  # fewer that begin differently give no verdict
+    margin_pct: float  # ratios nearer to 1 are equal
     conditions: dict[str, Any]
     columns: dict[str, Any]
 
@@ -543,9 +545,6 @@ class RepeatedRuns(SequenceExperiment, ABC):
 @dataclass
 class Odometry(RepeatedRuns):
     """What `sgf_align` runs on which sequences, and what is compared."""
-
-    verdict_runs: int  # fewer give no verdict
-    margin_pct: float
 
     def change(self, sequence: str, condition: str) -> dict[str, Any]:
         return self.conditions[condition]
@@ -612,8 +611,6 @@ class TrajectoryTable(RepeatedRuns):
     SCORES_OWN = True
 
     fail_above_pct: float  # ATE RMSE over the length of the path
-    verdict_runs: int  # fewer give no verdict
-    margin_pct: float
     published: str
     programs: dict[str, TrackingProgram]
     tuned: bool = False  # options on top of the columns' own: those tuned on the fold without the sequence
@@ -801,6 +798,7 @@ class ReportPairs:
     groups: list[str]  # columns: each of their values is compared by itself
     pairs: list[str]  # columns that two lines of a pair share
     clusters: dict[str, list[str]]  # by name the columns whose values are independent draws
+    run: str = ""  # below the results, what made a method's errors; {column} is a group or the method
 
 
 @dataclass
@@ -856,7 +854,7 @@ class Interval:
     estimate: str  # columns
     low: str
     high: str
-    count: str  # column: how many pairs it is of
+    counts: list[str]  # columns: how many pairs and runs it is of; each has to be as many as a verdict takes
     groups: list[str] = field(default_factory=list)
     where: dict[str, Any] = field(default_factory=dict)
     above: float | None = None
@@ -922,6 +920,8 @@ class Comparison:
     protocol: str  # what of it is the same
     tolerances: list[Tolerance]  # the first that fits a value counts
     obstacle: str = ""  # why none of its values can be marked
+    least_runs: int = 0  # of a sequence that a value is a mean of
+    runs_reason: str = ""  # why it takes so many
 
 
 Experiment = Union[
@@ -1059,6 +1059,11 @@ def _check_runs(study: RepeatedRuns, where: str) -> None:
     for key in ("runs", "first_frames"):
         if getattr(study, key) < 1:
             raise ConfigError(f"{where}: {key} is {getattr(study, key)}; it has to be positive")
+    if study.first_frames < study.verdict_runs:
+        raise ConfigError(
+            f"{where}: first_frames is {study.first_frames}; a verdict takes {study.verdict_runs} runs that begin"
+            " at different ones"
+        )
     if any(study.change(sequence, study.undisturbed) for sequence in study.sequences):
         raise ConfigError(f"{where}: conditions: the first one must change nothing")
 

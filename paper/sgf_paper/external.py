@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import subprocess
 import tempfile
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
@@ -16,12 +15,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from sgf_paper import config
+from sgf_paper import config, odometry_scores
 from sgf_paper.config import JoinedTable, TableSequence
 
 SUFFIXES = (".txt", ".csv")
 NS = 10**9
 TOLERANCE_NS = 1000  # to which sgf_eval compares times
+LAST_S = 2**63 // NS  # that 64 bits of nanoseconds hold
 MAX_NORM_ERROR = 1e-3  # that sgf_eval takes
 # Fields of a pose in the order of TUM's format: tx ty tz qx qy qz qw.
 TUM_FIELDS = [1, 2, 3, 4, 5, 6, 7]
@@ -58,10 +58,14 @@ def find_files(folder: Path) -> dict[tuple[str, str], list[Path]]:
 def _time_ns(text: str, is_csv: bool) -> int:
     """Exact: a float has too few digits for times since 1970."""
     try:
-        return int(text) if is_csv else int((Decimal(text) * NS).to_integral_value())
-    except (ValueError, InvalidOperation, OverflowError):
-        unit = "whole nanoseconds" if is_csv else "seconds"
-        raise ValueError(f"the time '{text}' is no number of {unit}") from None
+        time_s = Decimal(int(text)).scaleb(-9) if is_csv else Decimal(text)
+    except (ValueError, InvalidOperation):
+        time_s = Decimal("nan")
+    if not time_s.is_finite():
+        raise ValueError(f"the time '{text}' is no number of {'whole nanoseconds' if is_csv else 'seconds'}")
+    if abs(time_s) > LAST_S:
+        raise ValueError(f"the time '{text}' is no time: 64 bits of nanoseconds do not hold it")
+    return int((time_s * NS).to_integral_value())
 
 
 def _number(text: str) -> float:
@@ -175,7 +179,7 @@ class Scorer:
                 sequence.path(self.suite, self.data),
             ]
             command += ["--frame", how.frame, "--align", how.align, "--out", out]
-            subprocess.run(command, check=True)
+            odometry_scores.evaluate(command)
             scores = json.loads(out.read_text())
         where = {"system": path.parent.name, "dataset": sequence.dataset, "sequence": path.stem}
         return where | {name: scores[name] for name in KEPT}
@@ -194,7 +198,7 @@ def main() -> None:
     try:
         check_names(joined, path, a.files)
         line = Scorer(joined, a.program, a.suite, a.data).score(path)
-    except (ExternalError, config.ConfigError) as error:
+    except (ExternalError, odometry_scores.ScoresError, config.ConfigError) as error:
         raise SystemExit(f"Error: {error}") from None
     pd.DataFrame([line]).to_csv(a.out, index=False)
 

@@ -293,7 +293,7 @@ class Grid:
         cells += [self._average(system, errors), *self._shares(system)]
         published_as = f" ({system.published})" if system.published not in ("", system.name) else ""
         label = system.name + published_as
-        return {"group": system.group, "label": label, "column": system.column, "cells": cells}
+        return {"system": system, "label": label, "cells": cells}
 
     def block(self) -> dict:
         """What the templates lay out."""

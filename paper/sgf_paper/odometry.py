@@ -36,7 +36,17 @@ def read_runs(study: Odometry, raw: Path, sequences: list[str], runs: int) -> pd
 
 def errors_by_run(runs: pd.DataFrame) -> pd.DataFrame:
     """ATE in mm: a line per run, a column per sequence, condition and column."""
-    return runs.pivot(index="run", columns=KEYS, values="ate_mm")
+    return runs.pivot(index=["first_frame", "run"], columns=KEYS, values="ate_mm").sort_index(level="run")
+
+
+def _estimate(values: pd.Series) -> Estimate:
+    """The median of values by run, and its interval over the runs that begin differently."""
+    return paired.estimate_median(values, values.index.get_level_values("first_frame"))
+
+
+def _ratio(errors: pd.DataFrame, key: tuple[str, str, str], other: tuple[str, str, str]) -> Estimate:
+    """Of the errors of a column over those of another, run by run."""
+    return _estimate(pd.Series(paired.ratios(errors[key], errors[other]), index=errors.index))
 
 
 def _ratio_fields(ratio: Estimate) -> dict[str, float]:
@@ -48,8 +58,7 @@ def _ratio_to_undisturbed(study: Odometry, errors: pd.DataFrame, key: tuple[str,
     sequence, condition, column = key
     if condition == study.undisturbed:
         return paired.estimate_median([])
-    unchanged = errors[sequence, study.undisturbed, column]
-    return paired.estimate_median(paired.ratios(errors[key], unchanged))
+    return _ratio(errors, key, (sequence, study.undisturbed, column))
 
 
 def make_table(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
@@ -57,7 +66,7 @@ def make_table(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
     errors = errors_by_run(runs)
     lines = []
     for key, own in runs.groupby(KEYS, sort=False):
-        ate = paired.estimate_median(errors[key])
+        ate = _estimate(errors[key])
         ratio = _ratio_to_undisturbed(study, errors, key)
         lines.append({
             **dict(zip(KEYS, key)),
@@ -80,8 +89,7 @@ def compare(study: Odometry, runs: pd.DataFrame) -> pd.DataFrame:
     lines = []
     for sequence, condition in runs[["sequence", "condition"]].drop_duplicates().itertuples(index=False):
         for column, baseline in study.comparisons:
-            both = (errors[sequence, condition, name] for name in (column, baseline))
-            ratio = paired.estimate_median(paired.ratios(*both))
+            ratio = _ratio(errors, (sequence, condition, column), (sequence, condition, baseline))
             lines.append({
                 **dict(zip(COMPARED, (sequence, condition, column, baseline, ratio.runs))),
                 **_ratio_fields(ratio),
@@ -95,7 +103,7 @@ def _draw_column(axis: plt.Axes, lines: pd.DataFrame, place: float, width: float
     top = axis.get_ylim()[1]
     kept = lines[~lines["lost"]]["ate_mm"]
     axis.plot([place] * len(kept), kept, ".", color=colour, markersize=3, alpha=0.6, zorder=2)
-    median = paired.estimate_median(lines["ate_mm"])
+    median = paired.estimate_median(lines["ate_mm"], lines["first_frame"])
     if np.isfinite(median.median):
         ends = [place - width / 2, place + width / 2]
         axis.plot(ends, [median.median] * 2, color=colour, linewidth=2, zorder=3)

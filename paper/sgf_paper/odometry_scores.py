@@ -76,6 +76,13 @@ def read_run(study: RepeatedRuns, runs: Path, condition: str, column: str) -> Ru
     )
 
 
+def evaluate(command: list[Any]) -> None:
+    """Runs sgf_eval, which names its mistakes on the standard error. @throws ScoresError if it fails."""
+    done = subprocess.run(command, stdout=subprocess.DEVNULL)
+    if done.returncode:
+        raise ScoresError(f"{command[2]}: sgf_eval cannot score it (exit code {done.returncode})")
+
+
 @dataclass(frozen=True)
 class Scorer:
     """sgf_eval on the trajectories of one sequence."""
@@ -90,7 +97,7 @@ class Scorer:
             command = [self.program, "trajectory", run.trajectory, "--sequence", self.folder]
             command += [*self.study.score_flags(run.column), "--out", out.name]
             common = ["--common", *(other.trajectory for other in others)] if others else []
-            subprocess.run([*command, *common], stdout=subprocess.DEVNULL, check=True)
+            evaluate([*command, *common])
             scores = json.loads(Path(out.name).read_text())
         if any(scores[name] is None for name in wanted):
             raise ScoresError(f"{run.trajectory}: {scores['poses']} common poses are too few for errors")
@@ -141,7 +148,10 @@ def main() -> None:
     parser.add_argument("--runs", type=Path, required=True, help="folder of the runs")
     parser.add_argument("--out", type=Path, required=True, help="CSV file to write")
     a = parser.parse_args()
-    table = score(config.load_experiment(a.name), a.sequence, a.folder, a.runs, a.program)
+    try:
+        table = score(config.load_experiment(a.name), a.sequence, a.folder, a.runs, a.program)
+    except (ScoresError, config.ConfigError) as error:
+        raise SystemExit(f"Error: {error}") from None
     table.to_csv(a.out, index=False)
 
 

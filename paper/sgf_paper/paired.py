@@ -27,18 +27,26 @@ class Estimate:
     median: float
     low: float
     high: float
-    runs: int
+    runs: int  # independent ones: clusters
 
 
-def estimate_median(of_runs: Sequence[float]) -> Estimate:
-    """The median of the values that are numbers; infinite ones count."""
+def estimate_median(of_runs: Sequence[float], clusters: Sequence[Hashable] | None = None) -> Estimate:
+    """The median of the values that are numbers; infinite ones count.
+
+    @param clusters of each value: those of one cluster see the same images, and are drawn together. None: all differ.
+    """
     values = np.asarray(of_runs, dtype=float)
-    values = values[~np.isnan(values)]
-    if values.size == 0:
+    known = ~np.isnan(values)
+    if not known.any():
         return Estimate(NAN, NAN, NAN, 0)
-    medians = np.median(values[_resample(values.size)], axis=1)
-    low, high = quantiles(medians, ENDS)
-    return Estimate(float(np.median(values)), low, high, values.size)
+    values = values[known]
+    codes, left = pd.factorize(pd.Series(range(len(known)) if clusters is None else list(clusters))[known])
+    order = np.argsort(values)
+    drawn = _resample(len(left))
+    times = np.stack([(drawn == cluster).sum(axis=1) for cluster in range(len(left))], axis=1)
+    low, high = quantiles(_weighted_medians(values[order], times[:, codes[order]]), ENDS)
+    middle = _weighted_medians(values[order], np.ones((1, values.size), dtype=int))
+    return Estimate(float(middle[0]), low, high, len(left))
 
 
 def _resample(count: int) -> np.ndarray:
@@ -116,20 +124,10 @@ def estimate_ratio(
     Medians are taken of logarithms, so that the two may change places.
     @param clusters as for compare_success(); the estimate's `runs` are those that are left.
     """
-    ratio = np.asarray(ratios(own, of_baseline))
-    known = ~np.isnan(ratio)
-    if not known.any():
-        return estimate_median([])
     with np.errstate(divide="ignore"):
-        logs = np.log(ratio[known])
-    codes, left = pd.factorize(pd.Series(list(clusters))[known])
-    order = np.argsort(logs)
-    drawn = _resample(len(left))
-    times = np.stack([(drawn == cluster).sum(axis=1) for cluster in range(len(left))], axis=1)
-    medians = np.exp(_weighted_medians(logs[order], times[:, codes[order]]))
-    low, high = quantiles(medians, ENDS)
-    middle = np.exp(_weighted_medians(logs[order], np.ones((1, logs.size), dtype=int)))
-    return Estimate(float(middle[0]), low, high, len(left))
+        of_logs = estimate_median(np.log(ratios(own, of_baseline)), clusters)
+    median, low, high = (float(np.exp(value)) for value in (of_logs.median, of_logs.low, of_logs.high))
+    return Estimate(median, low, high, of_logs.runs)
 
 
 def _weighted_medians(ordered: np.ndarray, counts: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ from typing import Any
 import pandas as pd
 from PIL import Image
 
-from sgf_paper import claims, comparison, config, pairs, report_grid, text
+from sgf_paper import claims, comparison, config, pairs, report_grid, summary, text
 from sgf_paper.claims import Finding, Tables
 from sgf_paper.config import Report, ReportItem
 from sgf_paper.deviations import Chapter, Notes, load_deviations, read_chapters
@@ -32,6 +32,7 @@ from sgf_paper.report_grid import Grid, Links, Marks, Page
 MAIN = config.PAPER / "main.tex"
 CHAPTERS = ["claims", "slips", "new"]
 PNG_BYTES = 150_000  # larger figures become WebP
+MOST_RUNS = 4  # that an outcome names; its lines name more
 NOT_RUN = "it has not been run; ./reproduce.sh --only {} makes it"
 # What the verdicts of a chapter are called.
 WORDS = {
@@ -58,6 +59,8 @@ class Part:
     name: str
     title: str
     reason: str
+    earlier: str = ""  # why what there is is of an earlier run; empty where it is not
+    record: str = ""  # run.json of what made it, below the results
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class ShownItem:
     """A table or figure with all that there is of it."""
 
     item: ReportItem
-    reason: str  # why there is nothing
+    part: Part
     grids: list[Grid]
     printed: list[Grid]  # those that LaTeX gets
     figures: list[str]
@@ -81,12 +84,18 @@ class Contents:
     findings: dict[str, list[Finding]]  # by chapter
     values: pd.DataFrame
     pairs: dict[str, pd.DataFrame]  # by title
+    runs_of: report_grid.RunLinks
     items: list[ShownItem]
     parts: list[Part]
     pages: list[Page]
     averages: pd.DataFrame
     deviations: list[Chapter]
     numbers: dict[str, int]  # of deviations, by key
+
+    @property
+    def tolerances(self) -> dict[str, str]:
+        """Letters of the reasons of tolerances."""
+        return {reason: report_grid.letters(index) for index, reason in enumerate(self.values["tolerance"].unique())}
 
     @property
     def counts(self) -> dict[str, int]:
@@ -113,22 +122,20 @@ def title(chapter: str, finding: Finding) -> str:
     return word(chapter, finding.judged.verdict)
 
 
-def read_reasons(listing: Path) -> dict[str, str]:
-    """Why experiments were not made in the last run, from lines `name<TAB>reason`."""
-    if not listing.exists():
-        return {}
-    return dict(line.split("\t", 1) for line in listing.read_text().splitlines() if line)
-
-
 def list_parts(results: Path, reasons: dict[str, str], main_file: Callable) -> list[Part]:
     """All experiments but the report itself. @param main_file says where an experiment's main file is."""
-    parts = []
+    parts, links = [], Links(results)
     for path in sorted(config.EXPERIMENTS.glob("*.yaml")):
         experiment = config.load_experiment(path.stem)
-        if experiment.kind != "report":
-            made = main_file(experiment, results).exists()
-            reason = "" if made else reasons.get(path.stem) or NOT_RUN.format(path.stem)
-            parts.append(Part(path.stem, experiment.title, reason))
+        if experiment.kind == "report":
+            continue
+        reason = reasons.get(path.stem, "")
+        if main_file(experiment, results).exists():
+            made = main_file(experiment, Path())
+            record = links.record(f"tables/{made.stem}.csv") or links.record(str(made))
+            parts.append(Part(path.stem, experiment.title, "", reason, record))
+        else:
+            parts.append(Part(path.stem, experiment.title, reason or NOT_RUN.format(path.stem)))
     return parts
 
 
@@ -144,7 +151,7 @@ def show_item(
 ) -> ShownItem:
     """What there is of a table or figure."""
     if part.reason:
-        return ShownItem(item, part.reason, [], [], [], [], [])
+        return ShownItem(item, part, [], [], [], [], [])
     tables = results / "tables"
     experiment = config.load_experiment(item.name)
     grids: list[Grid] = []
@@ -155,7 +162,7 @@ def show_item(
     own = [(spec, report_grid.csv_grid(item.name, spec, tables, links, notes)) for spec in item.tables]
     grids += [grid for _, grid in own if grid]
     return ShownItem(
-        item, "", grids,
+        item, part, grids,
         printed=[grid for spec, grid in own if grid and not spec.only_html],
         figures=[name for name in item.figures if (results / "figures" / f"{name}.png").exists()],
         latex=[name for name in item.latex if (tables / f"{name}.tex").exists()],
@@ -163,14 +170,14 @@ def show_item(
     )  # fmt: skip
 
 
-def compare_methods(report: Report, tables: Tables) -> dict[str, pd.DataFrame]:
+def compare_methods(report: Report, tables: Tables, links: Links) -> dict[str, pd.DataFrame]:
     """All pairs of methods, by the title of what they are of."""
     rule = pairs.Rule(report.verdict_clusters, report.margin_pct)
     found = {}
     for spec in report.pairs:
         lines = tables(spec.table)
         if lines is not None and not lines.empty:
-            found[spec.title] = pairs.make_table(spec, lines, rule)
+            found[spec.title] = report_grid.link_pairs(spec, pairs.make_table(spec, lines, rule), links)
     return found
 
 
@@ -206,8 +213,9 @@ def gather(name: str, results: Path, reasons: dict[str, str], main_file: Callabl
     return Contents(
         report=report,
         findings=find(report, {claims.THIS_RUN: tables, claims.REFERENCE: Tables(config.REFERENCE)}),
-        values=values,
-        pairs=compare_methods(report, tables),
+        values=report_grid.link_values(values, links),
+        pairs=compare_methods(report, tables, links),
+        runs_of=report_grid.RunLinks(report, tables, links),
         items=[show_item(item, by_name[item.name], results, links, marks, notes) for item in report.items],
         parts=parts,
         pages=pages,
@@ -241,7 +249,7 @@ def write_html(contents: Contents, results: Path, no_pdf: str) -> None:
     }
     document = text.render(
         "report.html.j2", c=contents, figures=figures, no_pdf=no_pdf, word=word, title=title,
-        classes=CLASSES,
+        classes=CLASSES, most_runs=MOST_RUNS,
     )  # fmt: skip
     write_whole(results / "report.html", document)
 
@@ -312,14 +320,14 @@ def write_csvs(contents: Contents, tables: Path, name: str) -> None:
     tables.mkdir(parents=True, exist_ok=True)
     verdict_table(contents).to_csv(tables / f"{name}_verdicts.csv", index=False)
     claim_table(contents).to_csv(tables / f"{name}_claims.csv", index=False)
-    contents.values.round(6).to_csv(tables / f"{name}_values.csv", index=False)
+    contents.values[comparison.ROW].round(6).to_csv(tables / f"{name}_values.csv", index=False)
     every = list(contents.pairs.values()) or [pd.DataFrame(columns=pairs.ROW)]
-    pd.concat(every, ignore_index=True).round(4).to_csv(tables / f"{name}_pairs.csv", index=False)
+    pd.concat(every, ignore_index=True)[pairs.ROW].round(4).to_csv(tables / f"{name}_pairs.csv", index=False)
 
 
 def make_report(name: str, results: Path, listing: Path, main_file: Callable) -> None:
     """Makes report.html, report.pdf where LaTeX is there, and their numbers as tables."""
-    contents = gather(name, results, read_reasons(listing), main_file)
+    contents = gather(name, results, summary.read_reasons(listing), main_file)
     write_csvs(contents, results / "tables", name)
     write_fragments(contents, results / "report")
     no_pdf = why_no_pdf()
@@ -332,8 +340,6 @@ def make_report(name: str, results: Path, listing: Path, main_file: Callable) ->
 
 
 def main() -> None:
-    from sgf_paper import summary  # which names the files of all experiments
-
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("name", help="report of paper/experiments")
     parser.add_argument("--results", type=Path, required=True, help="folder of all results")

@@ -10,10 +10,12 @@ from pathlib import Path
 import pandas as pd
 
 from sgf_paper import claims, comparison, config, joined_table, text
-from sgf_paper.config import JoinedTable, ReportTable, Table, TrajectoryTable
+from sgf_paper.config import JoinedTable, Report, ReportPairs, ReportTable, SelfMatch, Table, TrajectoryTable
 from sgf_paper.deviations import Notes
+from sgf_paper.joined_table import System
 
 NO_VALUE = "the table has no value here"
+RECORD = "run.json"
 PAGES = {"scene": "scene-{}-{}", "sequence": "sequence-{}"}
 
 
@@ -27,6 +29,7 @@ class Cell:
     mark: str = ""  # pass, near or fail
     best: bool = False
     notes: list[tuple[int, str]] = field(default_factory=list)  # deviations from the paper
+    record: str = ""  # of the run that made the line, in its first cell
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Grid:
     def reasons(self) -> dict[str, str]:
         """Letters of the reasons in the table."""
         found = dict.fromkeys(cell.reason for row in self.rows for cell in row if cell.reason)
-        return {reason: _letters(index) for index, reason in enumerate(found)}
+        return {reason: letters(index) for index, reason in enumerate(found)}
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,9 @@ class Page:
     aliases: list[str] = field(default_factory=list)  # further anchors: what experiments call the sequence
 
 
-def _letters(index: int) -> str:
+def letters(index: int) -> str:
     """a to z, then aa, ab, ..."""
-    return (_letters(index // 26 - 1) if index >= 26 else "") + chr(ord("a") + index % 26)
+    return (letters(index // 26 - 1) if index >= 26 else "") + chr(ord("a") + index % 26)
 
 
 def as_number(shown: str) -> float | None:
@@ -80,6 +83,18 @@ class Links:
     def __call__(self, path: str) -> str:
         return path if path in self.anchors or path and (self.results / path).exists() else ""
 
+    def record(self, path: str) -> str:
+        """The run.json of the run that made a file or folder."""
+        for made in (Path(path), *Path(path).parents):
+            for folder in (made, "runs" / made):
+                if (self.results / folder / RECORD).exists():
+                    return (folder / RECORD).as_posix()
+        return ""
+
+    def name_run(self, cells: list[Cell], path: str) -> list[Cell]:
+        """A line whose first cell links to the record of the run that made it."""
+        return [replace(cells[0], record=self.record(path)), *cells[1:]]
+
 
 def csv_grid(name: str, spec: ReportTable, folder: Path, links: Links, notes: Notes) -> Grid | None:
     """Lines of a CSV file of experiment `name`; None where it is not there."""
@@ -98,7 +113,7 @@ def csv_grid(name: str, spec: ReportTable, folder: Path, links: Links, notes: No
         if "column" in columns:
             at = columns.index("column")
             cells[at] = replace(cells[at], notes=notes(name, line["column"]))
-        rows.append(cells)
+        rows.append(links.name_run(cells, spec.run.format(**line)))
     return Grid(spec.title, columns, rows)
 
 
@@ -119,9 +134,12 @@ class Marks:
     def __init__(self, values: pd.DataFrame):
         self.values = {tuple(line[key] for key in comparison.KEYS): line for line in values.to_dict("records")}
 
-    def __call__(self, *key: str) -> str:
-        mark = self.values.get(key, {}).get("mark", comparison.NO_MARK)
-        return "" if mark == comparison.NO_MARK else mark
+    def __call__(self, *key: str, by: str = "") -> str:
+        """The mark of a value; none if another system than `by` was measured."""
+        value = self.values.get(key)
+        if value is None or value["mark"] == comparison.NO_MARK or value["measured_by"] != by:
+            return ""
+        return value["mark"]
 
 
 def stereo_grids(table: Table, folder: Path, links: Links, marks: Marks, notes: Notes) -> list[Grid]:
@@ -152,24 +170,28 @@ def _stereo_grid(
         for quantity, cell in zip(table.quantities, row.cells):
             mark = marks(table.name, f"{matcher}, {block.region}", row.cost, quantity, quantity) if marks else ""
             cells.append(_stereo_cell(cell, missing, href, mark))
-        rows.append([*cells, _won_cell(row, block, kind)])
+        won = _won_cell(row, block, kind, links(f"tables/{table.name}_scenes.csv"))
+        rows.append(links.name_run([*cells, won], f"{scores}.csv"))
     title = f"{block.dataset}, {block.region}, {block.matcher}, {kind} ({scenes})"
     head = ["cost", *(text.LABELS[quantity] for quantity in table.quantities), "scenes won"]
-    note = "In brackets: published. A cost links to its options, a value to the scores of its scenes."
+    note = (
+        "In brackets: published, or of how many scenes a mean is where no pixel is matched on others."
+        " A cost links to its options, a value to the scores of its scenes."
+    )
     return Grid(title, head, rows, note)
 
 
 def _stereo_cell(cell: text.Cell, missing: str, href: str, mark: str) -> Cell:
     published = f" ({cell.published})" if cell.published else ""
     if cell.measured:
-        return Cell(cell.measured + published, href=href, mark=mark, best=cell.best)
+        return Cell(cell.shown + published, href=href, mark=mark, best=cell.best)
     reason = missing if published else f"{missing}, and the paper has no value"
     return Cell(f"–{published}", reason if missing != "no pixel is matched" else missing)
 
 
-def _won_cell(row: text.Row, block: text.Block, kind: str) -> Cell:
+def _won_cell(row: text.Row, block: text.Block, kind: str, href: str) -> Cell:
     if row.won:
-        return Cell(row.won)
+        return Cell(row.won, href=href)
     if row.extra:
         return empty("only the paper's columns count")
     return empty("counted for fixed parameters only" if block.scenes else f"{block.dataset} is not at hand")
@@ -191,17 +213,17 @@ def joined_grids(joined: JoinedTable, folder: Path, links: Links, marks: Marks, 
 def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks, notes: Notes) -> Grid:
     labels = {"_".join(name.split("_")[:2]): (name, label) for name, label in joined_table.labels_of(joined).items()}
     euroc = block["title"].startswith("euroc,")
+    labels["average"] = "", "avg"
     heads = [*block["sequences"], "average", "success", "coverage %"]
     rows = []
     for row in block["rows"]:
-        published = row["label"].split("(")[-1].rstrip(")")
-        own = row["group"] in (joined_table.REBUILT, joined_table.BEYOND)
-        group = f" [{row['group']}]" if row["group"] != joined_table.REBUILT else ""
-        cells = [Cell(row["label"] + group, notes=notes(*row["column"]))]
+        system = row["system"]
+        group = f" [{system.group}]" if system.group != joined_table.REBUILT else ""
+        cells = [Cell(row["label"] + group, notes=notes(*system.column))]
         for head, cell in zip(heads, row["cells"]):
-            name, label = labels.get(head, ("", "avg"))
-            mark = marks(joined.name, "", published, label, "ate_mean_m") if euroc and not cell.reason else ""
-            href = links(f"#{PAGES['sequence'].format(name)}") if own and not cell.reason else ""
+            name, label = labels.get(head, ("", ""))
+            mark = marks(joined.name, "", system.published, label, "ate_mean_m", by=system.name) if euroc else ""
+            href = "" if cell.reason else links(_joined_run(joined, system, name))
             cells.append(Cell(cell.shown, block["reasons"].get(cell.reason, ""), href, mark))
         rows.append(cells)
     note = (
@@ -209,6 +231,63 @@ def _joined_grid(joined: JoinedTable, block: dict, links: Links, marks: Marks, n
         " infinite wherever methods are compared. In brackets: published."
     )
     return Grid(block["title"], ["system", *heads], rows, note)
+
+
+def _joined_run(joined: JoinedTable, system: System, sequence: str) -> str:
+    """What made a system's value of a sequence, by EuRoC's name, or of all of them; nothing of what is published."""
+    if system.group == joined_table.PUBLISHED:
+        return ""
+    if system.group == joined_table.EXTERNAL:
+        folder = f"raw/{joined.name}/external/{system.name}"
+        return f"{folder}/{sequence}.csv" if sequence else folder
+    return f"#{PAGES['sequence'].format(sequence)}" if sequence else f"tables/{system.column[0]}_runs.csv"
+
+
+def link_values(values: pd.DataFrame, links: Links) -> pd.DataFrame:
+    """The paper's values with `href`, what made the measured one, and `record`, of the run."""
+    runs = {name: _value_runs(config.load_experiment(name)) for name in values["table"].unique()}
+    paths = [
+        runs[line["table"]](line) if line["measured"] == line["measured"] else "" for line in values.to_dict("records")
+    ]
+    return values.assign(href=[links(path) for path in paths], record=[links.record(path) for path in paths])
+
+
+def _value_runs(experiment: Table | JoinedTable | SelfMatch) -> Callable[[dict], str]:
+    """Says of a line of the paper's values what made the measured one."""
+    if experiment.kind == "table":
+        data = experiment.published_dataset
+        return lambda line: f"raw/{line['part'].split(',')[0]}/{data}/{line['row']}.csv"
+    if experiment.kind == "self_match":
+        return lambda line: f"raw/{experiment.name}/{experiment.published_group}_{line['column']}.csv"
+    systems = {system.name: system for system in joined_table.list_systems(experiment, experiment.published)}
+    names = {label: name for name, label in joined_table.labels_of(experiment).items()}
+    return lambda line: _joined_run(experiment, systems[line["measured_by"]], names.get(line["column"], ""))
+
+
+def link_pairs(spec: ReportPairs, table: pd.DataFrame, links: Links) -> pd.DataFrame:
+    """Comparisons with what made the errors of both methods, and where their pairs stand."""
+    groups = [dict(zip(spec.groups, where.split(", "))) for where in table["where"]]
+    for side in ("own", "other"):
+        paths = [spec.run.format(**group, **{spec.method: name}) for group, name in zip(groups, table[side])]
+        table[f"{side}_href"] = [links(path) for path in paths]
+    return table.assign(href=links(f"tables/{spec.table}.csv"))
+
+
+class RunLinks:
+    """What made the lines that an outcome rests on, as the report has it of their tables."""
+
+    def __init__(self, report: Report, tables: claims.Tables, links: Links):
+        shown = [spec for item in report.items for spec in item.tables]
+        self.patterns = {spec.table: spec.run for spec in [*shown, *report.pairs] if spec.run}
+        self.tables, self.links = tables, links
+
+    def __call__(self, outcome: claims.Outcome) -> list[str]:
+        if not outcome.lines:
+            return []
+        pattern = self.patterns.get(outcome.table, "")
+        lines = self.tables(outcome.table).loc[[line - claims.FIRST_LINE for line in outcome.lines]]
+        found = dict.fromkeys(self.links(pattern.format(**line)) for line in lines.to_dict("records"))
+        return [href for href in found if href]
 
 
 def _page(pages: dict[str, Page], kind: str, title: str, *key: str) -> Page:
@@ -234,7 +313,8 @@ def _scene_grid(table: Table, lines: pd.DataFrame, dataset: str, links: Links) -
     rows = []
     for line in lines.to_dict("records"):
         href = links(f"raw/{line['matcher']}/{dataset}/{line['cost']}.csv")
-        rows.append([_csv_cell(shown, "no pixel is matched", href) for shown in line.values()])
+        cells = [_csv_cell(shown, "no pixel is matched", href) for shown in line.values()]
+        rows.append(links.name_run(cells, href))
     return Grid(f"{table.title}: fixed parameters", list(lines.columns), rows)
 
 
@@ -259,7 +339,7 @@ def _runs_grid(name: str, sequence: str, lines: pd.DataFrame, links: Links) -> G
     rows = []
     for line in lines.to_dict("records"):
         href = links(f"raw/{name}/{sequence}/run_{line['run']}/{line['condition']}/{line['column']}")
-        rows.append([_run_cell(column, shown, href) for column, shown in line.items()])
+        rows.append(links.name_run([_run_cell(column, shown, href) for column, shown in line.items()], href))
     note = "∞: the run fails. A value links to its run."
     return Grid(f"{name}: runs on {sequence}", list(lines.columns), rows, note)
 

@@ -24,6 +24,7 @@ from sgf_paper.progress import clock
 PYTHON = cluster.PYTHON
 MARK = "SGF_RESULTS"  # in the environment of all that a run starts: the folder it works for
 DEFAULT_RESOURCES = {"mem_mb": 2000, "runtime": 120}  # of a job; minutes; the Snakefile has the others
+PROGRESS = str(config.PAPER / "sgf_paper" / "progress.py")
 LOCK_S = 5  # for what a killed run has started to end
 
 
@@ -134,6 +135,13 @@ def obstacle(stage: Experiment, datasets: dict[str, Dataset], programs: Path) ->
     return "" if has_data(stage, datasets) else "its data are not at hand"
 
 
+def repeats(stage: Experiment, runs: int) -> str:
+    """What is to be known of more runs than a stage has first frames; empty if there are not."""
+    if stage.kind not in ("odometry", "trajectory_table") or runs <= stage.first_frames:
+        return ""
+    return f"{stage.name}: {runs} runs begin at {stage.first_frames} different frames; undisturbed, the others repeat"
+
+
 def _where(settings: Settings) -> list[str]:
     """What tells Snakemake where to run jobs, and how many at a time."""
     if settings.on_cluster:
@@ -142,7 +150,7 @@ def _where(settings: Settings) -> list[str]:
     return ["--cores", str(settings.jobs), "--resources", f"mem_mb={memory}"]
 
 
-def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str]:
+def _snakemake_command(settings: Settings, stages: list[Experiment], flags: list[str]) -> list[str]:
     values = {
         "stages": " ".join(stage.name for stage in stages),
         "bin": settings.bin,
@@ -163,7 +171,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
         "--nolock",  # lock() does it, without stale locks after a crash
         "--rerun-incomplete",
         "--keep-going",
-        "--log-handler-script", str(config.PAPER / "sgf_paper" / "progress.py"),
+        *flags,
         "--config", *(f"{key}={value}" for key, value in values.items()),
     ]  # fmt: skip
 
@@ -182,7 +190,7 @@ def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int, 
     """Runs Snakemake; its own text goes to a log, progress lines to the standard output."""
     log = settings.logs / f"{log_name}.log"
     with log.open("w") as errors:
-        command = _snakemake_command(settings, stages)
+        command = _snakemake_command(settings, stages, ["--log-handler-script", PROGRESS])
         child = subprocess.Popen(
             command, stderr=errors, pass_fds=[lock_file], env=environment(settings.results)
         )
@@ -195,6 +203,16 @@ def run_snakemake(settings: Settings, stages: list[Experiment], lock_file: int, 
     if code:
         print(f"  Some stages failed; details: {log}", flush=True)
     return code == 0
+
+
+def unfinished(settings: Settings, stages: list[Experiment]) -> list[str]:
+    """Names of the stages that Snakemake has failed to make, or to make anew; all where it cannot say."""
+    command = _snakemake_command(settings, stages, ["--summary"])
+    done = subprocess.run(command, env=environment(settings.results), capture_output=True, text=True)
+    lines = [line.split("\t") for line in done.stdout.splitlines()]
+    finished = {fields[0] for fields in lines if fields[-1] == "no update"}
+    files = {stage.name: summary.main_file(stage, Path()).as_posix() for stage in stages}
+    return [name for name, file in files.items() if done.returncode or file not in finished]
 
 
 def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
@@ -214,33 +232,43 @@ def make_stages(settings: Settings, stages: list[Experiment]) -> bool:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in obstacles.items())
         raise RunError(f"nothing can be made ({reasons}); see the lines above, or give --data")
     print(f"== experiments: {' '.join(stage.name for stage in runnable)}", flush=True)
-    passed = run_in_turn(settings, runnable, obstacles, lock_file)
-    print_summary(settings, stages, obstacles, datasets, started)
+    for warning in filter(None, (repeats(stage, settings.runs) for stage in runnable)):
+        print(f"  {warning}", flush=True)
+    passed, failed = run_in_turn(settings, runnable, obstacles, lock_file)
+    print_summary(settings, stages, obstacles, failed, datasets, started)
     return passed
 
 
 def run_in_turn(
     settings: Settings, runnable: list[Experiment], obstacles: dict[str, str], lock_file: int
-) -> bool:
-    """Makes all stages but reports, then these of whatever was made; true if nothing failed."""
+) -> tuple[bool, list[str]]:
+    """Makes all stages but reports, then these of whatever was made.
+
+    @return whether nothing failed, and the names of the stages that did.
+    """
     reports = [stage for stage in runnable if stage.kind == "report"]
     others = [stage for stage in runnable if stage.kind != "report"]
-    passed = run_snakemake(settings, others, lock_file) if others else True
-    if reports:
-        write_reasons(settings, others, obstacles)
-        passed &= run_snakemake(settings, reports, lock_file, "snakemake_report")
-    return passed
+    passed = not others or run_snakemake(settings, others, lock_file)
+    failed = [] if passed else unfinished(settings, others)
+    write_reasons(settings, obstacles, failed)
+    if reports and not run_snakemake(settings, reports, lock_file, "snakemake_report"):
+        return False, failed + unfinished(settings, reports)
+    return passed, failed
 
 
-def write_reasons(settings: Settings, stages: list[Experiment], obstacles: dict[str, str]) -> None:
-    """Lists in results/stages.tsv what was not made and why; leaves the file alone if it says so already."""
-    failed = {
-        stage.name: "it failed; the run's output names the log"
-        for stage in stages
-        if not summary.main_file(stage, settings.results).exists()
-    }
-    reasons = {**{name: reason for name, reason in obstacles.items() if reason}, **failed}
+def write_reasons(settings: Settings, obstacles: dict[str, str], failed: list[str]) -> None:
+    """Lists in results/stages.tsv what was not made and why; leaves the file alone if it says so already.
+
+    What it says of stages that this run has nothing to do with stays.
+    @param obstacles of all stages of this run; empty for those that were run. @param failed names of these.
+    """
     listing = settings.results / "stages.tsv"
+    reasons = {name: reason for name, reason in summary.read_reasons(listing).items() if name not in obstacles}
+    now = {**obstacles, **dict.fromkeys(failed, "it failed; the run's output names the log")}
+    for name, reason in now.items():
+        if reason:
+            there = summary.main_file(config.load_experiment(name), settings.results).exists()
+            reasons[name] = reason + (f"; {summary.EARLIER}" if there else "")
     lines = "".join(f"{name}\t{reason}\n" for name, reason in sorted(reasons.items()))
     if not listing.exists() or listing.read_text() != lines:
         listing.write_text(lines)
@@ -250,19 +278,20 @@ def print_summary(
     settings: Settings,
     stages: list[Experiment],
     obstacles: dict[str, str],
+    failed: list[str],
     datasets: dict[str, Dataset],
     started: float,
 ) -> None:
     """Ends a run: what was made, where it lies, what was measured, what was absent.
 
-    @param obstacles why stages were left out, by name; empty for the others.
+    @param obstacles why stages were left out, by name; empty for the others. @param failed names of stages.
     """
     print(f"== summary ({clock(time.time() - started)}; all files in {settings.results})")
     for stage in stages:
         if obstacles[stage.name]:
             print(f"  {stage.name:14} left out: {obstacles[stage.name]}")
         else:
-            print("\n".join(summary.stage_lines(stage, settings.results, started)))
+            print("\n".join(summary.stage_lines(stage, settings.results, started, stage.name in failed)))
     absent = summary.absent_datasets(stages, datasets)
     print("  Data sets absent: " + ("; ".join(absent) if absent else "none"), flush=True)
 

@@ -52,6 +52,16 @@ MAIN_FILE = {
 }
 
 
+EARLIER = "what is shown is of an earlier run"
+
+
+def read_reasons(listing: Path) -> dict[str, str]:
+    """Why experiments were not made when they were last asked for, from lines `name<TAB>reason`."""
+    if not listing.exists():
+        return {}
+    return dict(line.split("\t", 1) for line in listing.read_text().splitlines() if line)
+
+
 def main_file(stage: Experiment, results: Path) -> Path:
     """The file whose presence and time say whether and when a stage was made."""
     return results / MAIN_FILE[stage.kind].format(stage.name)
@@ -67,10 +77,15 @@ def _table_lines(path: Path) -> list[str]:
     for (dataset, region, matcher), block in measured.groupby(keys, sort=False):
         wide = block.pivot(index="cost", columns="quantity", values="measured")
         order = wide.sort_values("mean_px")
-        texts = [f"{cost} {row.mean_px:.2f}" for cost, row in order.iterrows()]
+        scenes = block["scenes"].max()
+        of = block[block["quantity"] == "mean_px"].set_index("cost")["scenes"]
+        texts = [
+            f"{cost} {row.mean_px:.2f}" + (f" ({of[cost]} of {scenes})" if of[cost] < scenes else "")
+            for cost, row in order.iterrows()
+        ]
         best = order.iloc[0]
         lines.append(
-            f"{dataset} {region}, {block['scenes'].max()} scenes, {text.matcher_title(matcher)},"
+            f"{dataset} {region}, {scenes} scenes, {text.matcher_title(matcher)},"
             f" mean px: {', '.join(texts)};"
             f" {order.index[0]}: bad 2 {best.bad2_pct:.1f} %, invalid {best.invalid_pct:.1f} %"
         )
@@ -271,12 +286,14 @@ def _measured(stage: Experiment, results: Path) -> list[str]:
     return []
 
 
-def stage_lines(stage: Experiment, results: Path, started: float) -> list[str]:
+def stage_lines(stage: Experiment, results: Path, started: float, failed: bool = False) -> list[str]:
     """Lines on one stage; `started` is when the run began, in seconds of the epoch."""
     path = main_file(stage, results)
     if not path.exists():
         return [f"  {stage.name:14} NOT MADE"]
     state = "made" if path.stat().st_mtime >= started else "up to date"
+    if failed:
+        state = f"FAILED; {EARLIER}:"
     files = FILES[stage.kind].format(stage.name, folder=getattr(stage, "folder", ""))
     head = f"  {stage.name:14} {state:11} {files}"
     return [head, *(f"    {line}" for line in _measured(stage, results))]

@@ -41,6 +41,12 @@ class Cell:
     measured: str
     published: str
     best: bool
+    part: str = ""  # "14 of 15" where it is of fewer scenes than there are
+
+    @property
+    def shown(self) -> str:
+        """What is measured, with the scenes that it is of where some are missing."""
+        return f"{self.measured} ({self.part})" if self.part else self.measured
 
 
 @dataclass(frozen=True)
@@ -90,17 +96,19 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
 
 
 def _best(block: pd.DataFrame, main: list[str]) -> dict[str, float]:
-    """Least measured value of each error among the paper's columns."""
-    errors = block[block["cost"].isin(main) & (block["quantity"] != "invalid_pct")]
+    """Least measured value of each error among those of the paper's columns that have all scenes."""
+    whole = block["scenes"] == block["scenes"].max()
+    errors = block[whole & block["cost"].isin(main) & (block["quantity"] != "invalid_pct")]
     return errors.groupby("quantity")["measured"].min().to_dict()
 
 
-def _cell(values: pd.DataFrame, quantity: str, best: dict[str, float]) -> Cell:
+def _cell(values: pd.DataFrame, quantity: str, best: dict[str, float], scenes: int) -> Cell:
     if quantity not in values.index:
         return Cell("", "", False)
-    measured, published = values.loc[quantity, ["measured", "published"]]
-    is_best = measured == best.get(quantity)
-    return Cell(format_number(measured, 2), format_number(published, 2), is_best)
+    measured, published, own = values.loc[quantity, ["measured", "published", "scenes"]]
+    is_best = own == scenes and measured == best.get(quantity)
+    part = f"{own:.0f} of {scenes}" if 0 < own < scenes else ""
+    return Cell(format_number(measured, 2), format_number(published, 2), is_best, part)
 
 
 def _won(wins: pd.DataFrame, cost: str) -> str:
@@ -120,15 +128,15 @@ def make_blocks(
     blocks = []
     keys = ["dataset", "region", "matcher"]
     for (dataset, region, matcher), block in frame.groupby(keys, sort=False):
-        best = _best(block, main)
+        best, scenes = _best(block, main), int(block["scenes"].max())
         own_wins = wins[(wins[keys] == [dataset, region, matcher]).all(axis="columns")]
         rows = []
         for cost, lines in block.groupby("cost", sort=False):
             values = lines.set_index("quantity")
-            cells = [_cell(values, quantity, best) for quantity in quantities]
+            cells = [_cell(values, quantity, best, scenes) for quantity in quantities]
             rows.append(Row(cost, cost not in main, cells, _won(own_wins, cost)))
         title = matcher_title(matcher)
-        blocks.append(Block(dataset, region, title, int(block["scenes"].max()), rows))
+        blocks.append(Block(dataset, region, title, scenes, rows))
     return blocks
 
 

@@ -67,7 +67,7 @@ def make_table(study: TrajectoryTable, runs: pd.DataFrame) -> pd.DataFrame:
     published = _published_mm(study)
     lines = []
     for key, own in runs.groupby(KEYS, sort=False):
-        ate, mean = (paired.estimate_median(own[name]) for name in ("ate_mm", "ate_mean_mm"))
+        ate, mean = (paired.estimate_median(own[name], own["first_frame"]) for name in ("ate_mm", "ate_mean_mm"))
         q75, q90 = paired.quantiles(own["ate_mm"], [0.75, 0.9])
         sequence, condition, column = key
         compared = condition == study.undisturbed
@@ -107,6 +107,7 @@ def compare(study: TrajectoryTable, runs: pd.DataFrame) -> pd.DataFrame:
                     "baseline": baseline,
                     "rule": rule,
                     "sequences": own["sequence"].nunique(),
+                    "runs": own["run"].nunique(),
                     **asdict(difference),
                 })  # fmt: skip
     return pd.DataFrame(lines)

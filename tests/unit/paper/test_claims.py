@@ -162,10 +162,31 @@ def test_lines_without_a_partner_are_left_out_and_counted():
 )
 def test_an_interval_lies_above_or_below(low, high, count, state):
     frame = pd.DataFrame([{"gain": 2, "low": low, "high": high, "pairs": count}])
-    check = Interval("t", "gain", "low", "high", "pairs", above=0)
+    check = Interval("t", "gain", "low", "high", ["pairs"], above=0)
     assert states(check, frame) == [state]
     mirrored = pd.DataFrame([{"gain": -2, "low": -high, "high": -low, "pairs": count}])
     assert states(replace(check, above=None, below=0), mirrored) == [state]
+
+
+@pytest.mark.parametrize("runs, state", [(10, HOLDS), (3, FEW)])
+def test_an_interval_takes_enough_runs_however_many_pairs_they_make(runs, state):
+    frame = pd.DataFrame([{"gain": 2, "low": 1, "high": 3, "pairs": 4 * runs, "runs": runs}])
+    found = outcomes(Interval("t", "gain", "low", "high", ["pairs", "runs"], above=0), frame)[0]
+    assert found.state == state and found.number == f"2 [1, 3], pairs: {4 * runs}, runs: {runs}"
+
+
+def test_a_claim_on_successes_takes_ten_runs():
+    frame = pd.read_csv(config.REFERENCE / "table3_dso_compared.csv")
+    claim = next(claim for claim in EVERY if claim.id == "ngv_motion_local_light")
+    for runs, verdict in ((13, claims.REPRODUCED), (3, claims.UNDECIDED)):
+        assert claims.judge_checks(claim.checks, lambda _: frame.assign(runs=runs), RULE).verdict == verdict
+
+
+def test_an_outcome_names_the_lines_it_rests_on():
+    frame = pd.concat([costs(census=9.0, sgf=1.0, sad=2.0), costs(sgf=3.0, pm=2.0).assign(frame=2)], ignore_index=True)
+    assert [outcome.lines for outcome in outcomes(ORDER, frame)] == [(3, 4), (5, 6)]
+    assert [outcome.lines for outcome in outcomes(PAIR, scenes([1.0, 2.0], [2.0, 3.0]))] == [(2, 3, 4, 5)]
+    assert replace(Outcome("", HOLDS, "", "t"), lines=(2, 3, 4, 7, 9, 10)).lines_text == "2–4, 7, 9–10"
 
 
 def test_values_have_limits():

@@ -34,7 +34,7 @@ def test_values_of_the_same_pairs_are_marked(measured, mark):
     [
         ("middlebury2014_q", 15, "middlebury2014_h is not at hand"),
         ("debian_pairs", 2, "middlebury2014_h is not at hand"),
-        ("middlebury2014_h", 14, "14 of 15 are at hand"),
+        ("middlebury2014_h", 14, "14 of 15 have a value"),
     ],
 )
 def test_other_data_sizes_and_parts_of_them_are_not_marked(dataset, scenes, reason):
@@ -44,9 +44,9 @@ def test_other_data_sizes_and_parts_of_them_are_not_marked(dataset, scenes, reas
     assert list(own["mark"]) == ["–"] and list(own["reason"]) == [reason]
 
 
-def euroc_line(sequence, measured, dataset="euroc", system="vio_sgf3"):
+def euroc_line(sequence, measured, dataset="euroc", system="vio_sgf3", runs=10):
     return {"dataset": dataset, "sequence": sequence, "system": system, "quantity": "ate_mean_m", "measured": measured,
-            "published": 0.061, "runs": 1}  # fmt: skip
+            "published": 0.061, "runs": runs}  # fmt: skip
 
 
 def test_a_sequence_is_marked_by_itself_and_the_average_needs_all_ten():
@@ -59,6 +59,23 @@ def test_a_sequence_is_marked_by_itself_and_the_average_needs_all_ten():
     frame = compare(table3=[euroc_line(name, 0.2) for name in dict.fromkeys(names)])
     average = line_of(frame, row="basalt_sgf3", column="avg")
     assert (average["mark"], average["size"]) == ("fail", 10) and average["measured"] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    "runs, mark, reason", [(1, "–", "1 run; the paper's values are means"), (9, "–", "9 runs; "), (10, "pass", "off by")]
+)
+def test_a_mean_is_marked_only_if_it_is_of_as_many_runs_as_a_ranking_takes(runs, mark, reason):
+    line = line_of(compare(table3=[euroc_line("MH_01_easy", 0.062, runs=runs)]), row="basalt_sgf3", column="MH1")
+    assert line["mark"] == mark and line["reason"].startswith(reason)
+
+
+def test_the_average_has_as_many_runs_as_its_sequence_with_the_fewest():
+    joined = config.load_experiment("table3")
+    names = dict.fromkeys(s.euroc_name for s in joined.sequences if s.published and s.published != "V23")
+    lines = [euroc_line(name, 0.063, runs=9 if name == "MH_05_difficult" else 12) for name in names]
+    frame = compare(table3=lines)
+    assert line_of(frame, row="basalt_sgf3", column="avg")["reason"].startswith("9 runs; ")
+    assert line_of(frame, row="basalt_sgf3", column="V11")["runs"] == 12
 
 
 @pytest.mark.parametrize("dataset", ["synthetic", "euroc_slice"])

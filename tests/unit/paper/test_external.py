@@ -56,6 +56,10 @@ def test_both_formats_give_the_same_poses_and_times_to_the_nanosecond(write, tmp
         ("a.txt", f"now {POSE}", "the time 'now' is no number of seconds"),
         ("a.txt", f"nan {POSE}", "the time 'nan' is no number of seconds"),
         ("a.txt", f"inf {POSE}", "the time 'inf' is no number of seconds"),
+        ("a.txt", f"1e999999 {POSE}", "the time '1e999999' is no time: 64 bits of nanoseconds do not hold it"),
+        ("a.txt", f"1e5000 {POSE}", "the time '1e5000' is no time"),
+        ("a.txt", f"-1e5000 {POSE}", "the time '-1e5000' is no time"),
+        ("a.csv", "1" * 4000 + ",1,2,3,1,0,0,0", "the time '1+' is no time"),
         ("a.txt", "3 1 2 x 0 0 0 1", "'x' is no finite number"),
         ("a.txt", "3 1 2 nan 0 0 0 1", "'nan' is no finite number"),
         ("a.txt", "3 1 2 3 0 0 0 0", "the quaternion's norm is 0"),
@@ -195,3 +199,6 @@ def test_the_command_writes_a_line_or_says_what_is_wrong(scorer, write, tmp_path
     assert pd.read_csv(out)["rpe_one_second.translation_m"].tolist() == [7]
     with pytest.raises(SystemExit, match="Error: .*MH_01_easy.txt:1: has 1 fields"):
         run(write("1\n"))
+    scorer.program.write_text("#!/bin/sh\nexit 3\n")
+    with pytest.raises(SystemExit, match="Error: .*: sgf_eval cannot score it .exit code 3."):
+        run(write(f"1600000000.05 {POSE}\n"))

@@ -1,7 +1,9 @@
 """Odometry under changing light: how runs are started and scored, and what becomes of lost ones."""
 
 import copy
+import dataclasses
 import math
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -9,7 +11,7 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, odometry, odometry_scores, summary
+from sgf_paper import config, odometry, odometry_scores, repeated_runs, run, summary, text
 from sgf_paper.config import ConfigError
 
 NODE = yaml.safe_load((config.EXPERIMENTS / "odometry.yaml").read_text())
@@ -39,6 +41,7 @@ def study(experiments):
         ({"baselines": ["sbd"]}, r"baselines: no column \['sbd'\]"),
         ({"runs": 0}, "runs is 0; it has to be positive"),
         ({"first_frames": 0}, "first_frames is 0; it has to be positive"),
+        ({"first_frames": 9}, "first_frames is 9; a verdict takes 10 runs that begin at different ones"),
         ({"conditions": {"light": {"gamma": 2}}}, "the first one must change nothing"),
         ({"sequences": {"a": {"folder": "b"}}}, "sequences.a: key 'contents' is missing"),
     ],
@@ -104,6 +107,17 @@ def test_common_frames_too_few_for_errors_are_an_error(study, runs, sgf_eval, tm
         odometry_scores.score(study, "MH_03_medium", tmp_path, runs, sgf_eval[0])
 
 
+def test_the_command_says_in_a_line_what_cannot_be_scored(study, runs, sgf_eval, tmp_path, monkeypatch):
+    flags = ["--folder", tmp_path, "--program", sgf_eval[0], "--runs", runs, "--out", tmp_path / "scores.csv"]
+    monkeypatch.setattr(sys, "argv", ["scores", "odometry", "MH_03_medium", *map(str, flags)])
+    (runs / "light" / "sgf" / "trajectory.txt").write_text("null")
+    with pytest.raises(SystemExit, match="Error: .*light/sgf/trajectory.txt: 99 common poses are too few"):
+        odometry_scores.main()
+    sgf_eval[0].write_text("#!/bin/sh\nexit 3\n")
+    with pytest.raises(SystemExit, match="Error: .*sgf/trajectory.txt: sgf_eval cannot score it .exit code 3."):
+        odometry_scores.main()
+
+
 @pytest.fixture
 def raw(study, write_scores):
     """Scores of three runs on one sequence."""
@@ -157,6 +171,24 @@ def test_columns_are_compared_run_by_run(study, lines):
     assert compared.loc["undisturbed", ["ratio", "verdict"]].tolist() == [0.5, "better"]
     # 20 / 40, 30 / lost, 30 / 60
     assert compared.loc["light", ["ratio", "ratio_low", "ratio_high"]].tolist() == [0.5, 0, 0.5]
+
+
+def test_runs_that_begin_alike_are_no_further_evidence(study, lines):
+    again = pd.concat([lines, lines.assign(run=lines["run"] + 3)])
+    columns = ["ate_mm", "ate_low_mm", "ate_high_mm", "ratio", "ratio_low", "ratio_high", "ratio_runs"]
+    once, twice = (odometry.make_table(study, runs)[columns] for runs in (lines, again))
+    pd.testing.assert_frame_equal(once, twice)
+    pd.testing.assert_frame_equal(odometry.compare(study, lines), odometry.compare(study, again))
+    alike = odometry.compare(study, lines.assign(first_frame=lines["run"] // 2))
+    assert set(alike["verdict"]) == {"undecided"} and set(alike["runs"]) == {2}
+
+
+def test_more_runs_than_first_frames_are_said_to_repeat(study):
+    study = dataclasses.replace(study, first_frames=2)
+    said = text.render("sequences_run.md.j2", **repeated_runs.document_context(study, ["MH_03_medium"], 3))
+    assert "Of the 3 runs only 2 begin at different frames" in said
+    assert run.repeats(study, 2) == ""
+    assert run.repeats(study, 3) == "odometry: 3 runs begin at 2 different frames; undisturbed, the others repeat"
 
 
 def test_files_and_summary_show_what_was_lost(study, raw, tmp_path):

@@ -31,6 +31,16 @@ def test_the_interval_holds_the_middle_of_many_runs_and_all_of_few():
     assert estimate_median([1.0] * 6 + [INF] * 4).high == INF
 
 
+def test_runs_of_one_cluster_are_drawn_together():
+    values = np.arange(12.0)
+    found = estimate_median([*values, *values], [*range(12), *range(12)])
+    assert found == estimate_median(values), "the same runs twice say no more than once"
+    assert found.runs == 12
+    narrower = estimate_median([*values, *values])
+    assert narrower.high - narrower.low < found.high - found.low
+    assert estimate_median([1.0, 2.0, NAN], "aab").runs == 1
+
+
 def test_ratios_have_nothing_to_say_where_both_are_lost():
     values = ratios([1.0, INF, 2.0, INF], [2.0, 1.0, INF, INF])
     assert list(values[:3]) == [0.5, INF, 0] and math.isnan(values[3])

@@ -1,5 +1,7 @@
 """The report of a small tree of results: nothing empty without a reason, the same bytes for the same results."""
 
+import html
+import math
 import re
 import shutil
 from html.parser import HTMLParser
@@ -8,7 +10,7 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from sgf_paper import claims, config, deviations, report, report_grid, style, summary, text
+from sgf_paper import claims, comparison, config, deviations, joined_table, report, report_grid, style, summary, text
 from sgf_paper.config import ReportTable
 from sgf_paper.deviations import Notes
 from sgf_paper.style import plt
@@ -158,13 +160,95 @@ def test_only_the_papers_data_are_marked(made):
     assert 'class="pass"' not in re.sub(r'<(?:b|td) class="pass">(?:reproduced|holds)', "", page)
 
 
-def test_measured_on_the_papers_data_a_value_has_its_mark_beside_it(results, no_latex):
-    scores = pd.read_csv(results / "tables" / "table1.csv")
+RECORD = "runs/raw/stereo_bm/debian_pairs/sgf.csv/run.json"
+RECORD_OF_FLIGHT = "raw/table3_dso/MH_01_easy/run_0/undisturbed/photo/run.json"
+RECORD_OF_TABLE = "runs/tables/table1.csv/run.json"
+EARLIER = "it failed; the run's output names the log; what is shown is of an earlier run"
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory):
+    """A tree in which Table I is measured on the paper's data, by an earlier run, with records of runs: as `made`."""
+    root = make_results(tmp_path_factory.mktemp("earlier"))
+    scores = pd.read_csv(root / "tables" / "table1.csv")
     half = scores["dataset"] == "middlebury2014_h"
     scores.loc[half, "measured"] = scores.loc[half, "published"] * 1.01
     scores.loc[half, "scenes"] = 15
-    scores.to_csv(results / "tables" / "table1.csv", index=False)
-    assert re.search(r'<td class="pass[^>]*>3\.32 \(3\.29\) <b>pass</b>', make(results))
+    scores.to_csv(root / "tables" / "table1.csv", index=False)
+    for path in ("raw/stereo_bm/middlebury2014_h/sgf.csv", RECORD, RECORD_OF_FLIGHT, RECORD_OF_TABLE):
+        (root / path).parent.mkdir(parents=True)
+        (root / path).touch()
+    (root / "stages.tsv").write_text(f"fig5\tit failed\ntable1\t{EARLIER}\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report.shutil, "which", lambda name: None)
+        return root, html.unescape(make(root))
+
+
+def test_measured_on_the_papers_data_a_value_has_its_mark_beside_it(earlier):
+    shown = r'<td class="pass[^>]*><a href="raw/stereo_bm/middlebury2014_h/sgf.csv">3\.32 \(3\.29\)</a> <b>pass</b>'
+    assert re.search(shown, earlier[1])
+
+
+def test_only_measured_values_of_table_3_are_marked(results):
+    joined = config.load_experiment("table3")
+    names = [name for name, label in joined_table.labels_of(joined).items() if label != "V23"]
+    key = {"dataset": "euroc", "system": "vio_lssd", "published": math.nan, "runs": 10}
+    values = {"ate_mean_m": 0.066, "success_pct": 100, "coverage_pct": 100}
+    own = [
+        {**key, "sequence": name, "quantity": quantity, "measured": value}
+        for name in names
+        for quantity, value in values.items()
+    ]
+    lines = pd.read_csv(results / "tables" / "table3.csv")
+    lines = lines[(lines["dataset"] != "euroc") | (lines["system"] != "vio_lssd")]
+    pd.concat([lines, pd.DataFrame(own)]).to_csv(results / "tables" / "table3.csv", index=False)
+    tables = claims.Tables(results / "tables")
+    marks = report_grid.Marks(comparison.compare(tables))
+    grids = report_grid.joined_grids(joined, tables.folder, report_grid.Links(results), marks, NO_NOTES)
+    grid = next(grid for grid in grids if grid.title == "euroc, undisturbed")
+    marked = {row[0].shown: [head for head, cell in zip(grid.head, row) if cell.mark] for row in grid.rows}
+    sequences = [head for head in grid.head if head[:2] in ("MH", "V1", "V2") and head != "V2_03"]
+    assert {row: heads for row, heads in marked.items() if heads} == {"vio_lssd (basalt)": [*sequences, "average"]}
+    assert "basalt [published]" in marked and len(sequences) == 10
+
+
+def test_what_is_there_of_an_earlier_run_is_said_to_be(earlier):
+    root, page = earlier
+    article = page.split('id="item-table1"')[1].split("</article>")[0]
+    assert f"Of an earlier run: {EARLIER}." in article and "3.32 (3.29)" in article
+    assert page.count(f": {EARLIER}.") == 2, "at the head of the page as well"
+    assert page.count("Of an earlier run:") == 1 and "Not shown: it failed." in page
+    assert f"Of an earlier run: {EARLIER}" in (root / "report" / "item_table1.tex").read_text()
+    assert EARLIER in (root / "report" / "parts.tex").read_text()
+
+
+def test_a_line_links_to_the_record_of_its_run(earlier):
+    found = Cells(earlier[1]).addresses
+    assert found.count(RECORD) >= 4, "in both regions, of fixed parameters and of others"
+    assert found.count(RECORD_OF_FLIGHT) == 1 and found.count(RECORD_OF_TABLE) == 2
+
+
+def test_ratios_claims_and_counts_link_to_what_they_are_of(page):
+    pairs_of = page.split('id="pairs"')[1].split('id="slips"')[0]
+    assert '<td><a href="raw/stereo_bm/debian_pairs/sgf.csv">sgf</a></td>' in pairs_of
+    assert re.search(r'<td><a href="tables/table1_scenes.csv">0\.\d+</a></td>', pairs_of)
+    assert '<a href="tables/table1_scenes.csv">1/2</a>' in page, "scenes won"
+    claim = page.split('<article id="fig3_stronger_edges">')[1].split("</article>")[0]
+    lines = pd.read_csv(config.REFERENCE / "fig3.csv")
+    chosen = lines[(lines["case"] == "search") & (lines["column"] == "ngf")]
+    assert f'<a href="reference/fig3.csv">fig3</a>, line {chosen.index[0] + 2}</td>' in claim
+
+
+def test_measured_values_of_the_paper_link_to_their_scores(earlier):
+    values = earlier[1].split('id="values"')[1].split('id="paper"')[0]
+    assert '<td><a href="raw/stereo_bm/middlebury2014_h/sgf.csv">3.323</a></td>' in values
+
+
+def test_the_document_has_the_reasons_of_tolerances(earlier):
+    document = (earlier[0] / "report" / "values.tex").read_text()
+    for entry in config.load_comparisons().values():
+        for tolerance in entry.tolerances:
+            assert text._latex_prose(tolerance.reason) in document
 
 
 def test_failed_runs_are_shown(page):

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pandas as pd
 import pytest
 
-from sgf_paper import scores, text
+from sgf_paper import report_grid, scores, text
 from sgf_paper.config import Column, Parameters
 from sgf_paper.deviations import Notes
 from sgf_paper.scores import ScoresError
@@ -180,6 +181,24 @@ def test_only_the_best_column_of_the_paper_is_marked(blocks):
     assert [row.won for row in first.rows] == ["0/3", "3/3", ""]
     published = blocks[-1]
     assert not any(cell.best for row in published.rows for cell in row.cells)
+
+
+def test_a_mean_of_fewer_scenes_says_so_and_is_not_marked(table, sweep, write_raw):
+    def error(column, scene, *_):
+        return math.nan if (column, scene) == ("sgf", "a") else {"orig": 2.0, "sgf": 1.0, "ugf": 3.0}[column]
+
+    report = make_report(table, write_raw(error=error), ["toys"])
+    block = text.make_blocks(report.fixed, report.wins, table.quantities, sweep.main_columns)[0]
+    cells = {row.cost: row.cells[0] for row in block.rows}
+    assert (cells["sgf"].shown, cells["sgf"].best) == ("1.00 (2 of 3)", False)
+    assert (cells["orig"].shown, cells["orig"].best) == ("2.00", True)
+    assert [cell.shown for cell in block.rows[1].cells] == ["1.00 (2 of 3)"] * 2 + ["20.00 (2 of 3)", "30.00"]
+    for extension in ("md", "tex"):
+        document = render(extension, [block], table)
+        assert "1.00 (2 of 3)" in document and "1.00**" not in document and "textbf{1.00" not in document
+    links = report_grid.Links(Path("/nonexistent"))
+    grid = report_grid._stereo_grid(table, block, "fixed", links, None, NOTES)
+    assert grid.rows[1][1].shown == "1.00 (2 of 3)" and not grid.rows[1][1].best
 
 
 NOTES = Notes({"stereo_bm": {"all": ["shared"], "orig": ["other", "own"]}}, {"shared": 7, "own": 3, "other": 12})

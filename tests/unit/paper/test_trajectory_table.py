@@ -171,7 +171,7 @@ def test_quantiles_hold_failed_runs_as_infinite(study, lines):
 
 def test_success_is_compared_over_all_sequences(study, lines):
     compared = trajectory_table.compare(study, lines).set_index(["condition", "rule"])
-    assert len(compared) == 4
+    assert len(compared) == 4 and set(compared["runs"]) == {4}
     for rule in ("scale", "ate"):
         found = compared.loc[("light", rule), ["column", "baseline", "sequences", "pairs"]]
         assert found.tolist() == ["sgf", "photo", 2, 8]
@@ -189,6 +189,13 @@ def test_errors_are_compared_pair_by_pair_over_all_sequences_and_in_each(study, 
         assert (own["column"], own["baseline"]) == ("sgf", "photo")
         assert (own["pairs"], own["both_failed"], own["ratio"]) == (4 * runs, runs, 1)
         assert (own["ratio_low"], own["ratio_high"], own["verdict"]) == (0, 1.5, "undecided")
+
+
+def test_runs_that_begin_alike_do_not_narrow_intervals(study, lines):
+    again = pd.concat([lines, lines.assign(run=lines["run"] + 4)])
+    bounds = [f"{name}_{end}_mm" for name in ("ate", "ate_mean") for end in ("low", "high")]
+    once, twice = (trajectory_table.make_table(study, runs)[bounds] for runs in (lines, again))
+    pd.testing.assert_frame_equal(once, twice)
 
 
 @pytest.mark.parametrize("verdict_runs, said", [(4, "better"), (5, "undecided")])
