@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Iterator
 
-from sgf_paper import config
+from sgf_paper import paths
 from sgf_paper.strict_yaml import ConfigError, build_each, build_typed, read_yaml, require
 
-CATALOG = config.PROJECT / "datasets" / "catalog.yaml"
+CATALOG = paths.PROJECT / "datasets" / "catalog.yaml"
 LARGEST_SIZE = 10**15  # bytes
 
 
@@ -180,9 +180,9 @@ def needed_by(experiments: list[str], catalog: Catalog) -> list[str]:
     while waiting:
         name = waiting.pop()
         seen.add(name)
-        texts = set(_texts(read_yaml(config.EXPERIMENTS / f"{name}.yaml")))
+        texts = set(_texts(read_yaml(paths.EXPERIMENTS / f"{name}.yaml")))
         words |= texts
-        waiting += [text for text in texts - seen if (config.EXPERIMENTS / f"{text}.yaml").is_file()]
+        waiting += [text for text in texts - seen if (paths.EXPERIMENTS / f"{text}.yaml").is_file()]
     return [
         name
         for name, source in catalog.datasets.items()

@@ -14,8 +14,8 @@ from typing import Any
 import pandas as pd
 
 from sgf_paper import pairs
-from sgf_paper.config import Check, Claim, Interval, Ordering, Paired, Value
 from sgf_paper.pairs import Rule
+from sgf_paper.report_config import Check, Claim, Interval, Ordering, Paired, Value
 
 HOLDS, FAILS, OPEN, FEW, MISSING = "holds", "does not hold", "undecided", "too few", "not measured"
 REPRODUCED, PARTLY, NOT, UNDECIDED, NOT_MEASURED = "reproduced", "partly", "not", "undecided", "not measured"

@@ -18,7 +18,7 @@ from typing import Any
 import pandas as pd
 
 from sgf_paper import config
-from sgf_paper.config import RepeatedRuns
+from sgf_paper.tracking_config import RepeatedRuns
 
 # What sgf_eval calls the errors that are kept, at common times and of all poses of a run.
 ERRORS = {

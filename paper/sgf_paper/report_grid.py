@@ -10,8 +10,10 @@ from pathlib import Path
 import pandas as pd
 
 from sgf_paper import claims, comparison, config, joined_table, text
-from sgf_paper.config import JoinedTable, ReportTable, Table, TrajectoryTable
 from sgf_paper.deviations import Notes
+from sgf_paper.report_config import ReportTable
+from sgf_paper.stereo_config import Table
+from sgf_paper.tracking_config import JoinedTable, TrajectoryTable
 
 NO_VALUE = "the table has no value here"
 PAGES = {"scene": "scene-{}-{}", "sequence": "sequence-{}"}

@@ -17,9 +17,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from sgf_paper import cluster, config, file_lock, summary
-from sgf_paper.config import Dataset, Experiment
+from sgf_paper import cluster, config, file_lock, paths, summary
+from sgf_paper.config import Experiment
 from sgf_paper.progress import clock
+from sgf_paper.stereo_datasets import Dataset, dataset_flags, read_datasets
+from sgf_paper.strict_yaml import ConfigError
 
 PYTHON = cluster.PYTHON
 MARK = "SGF_RESULTS"  # in the environment of all that a run starts: the folder it works for
@@ -89,7 +91,7 @@ def end_leftovers(settings: Settings) -> None:
 
 def make_debian_pairs(settings: Settings) -> None:
     """Converts the pairs that Debian packages ship; says so and goes on where they are left out."""
-    script = config.PROJECT / "datasets" / "debian_pairs.py"
+    script = paths.PROJECT / "datasets" / "debian_pairs.py"
     out = settings.generated / "debian_pairs"
     done = subprocess.run([PYTHON, script, out], capture_output=True, text=True)
     (settings.logs / "debian_pairs.log").write_text(done.stdout + done.stderr)
@@ -100,7 +102,7 @@ def make_debian_pairs(settings: Settings) -> None:
 def find_datasets(settings: Settings) -> dict[str, Dataset]:
     """Has sgf_eval list the data sets at hand and keeps the list as results/datasets.tsv."""
     log = settings.logs / "datasets.log"
-    flags = config.dataset_flags(settings.data, str(settings.generated))
+    flags = dataset_flags(settings.data, str(settings.generated))
     with log.open("w") as errors:
         command = [settings.bin / "sgf_eval", "datasets", *flags]
         done = subprocess.run(command, stdout=subprocess.PIPE, stderr=errors, text=True)
@@ -108,7 +110,7 @@ def find_datasets(settings: Settings) -> dict[str, Dataset]:
         raise RunError(f"data sets cannot be listed: {log.read_text().strip()} (log: {log})")
     listing = settings.results / "datasets.tsv"
     listing.write_text(done.stdout)
-    return config.read_datasets(listing)
+    return read_datasets(listing)
 
 
 def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
@@ -155,7 +157,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
     return [
         "setpriv", "--pdeathsig", "KILL",  # it ends with this program, however that ends
         PYTHON, "-m", "snakemake",
-        "--snakefile", str(config.PAPER / "Snakefile"),
+        "--snakefile", str(paths.PAPER / "Snakefile"),
         "--directory", str(settings.results),
         *_where(settings),
         "--default-resources", *(f"{name}={value}" for name, value in DEFAULT_RESOURCES.items()),
@@ -163,7 +165,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment]) -> list[str
         "--nolock",  # lock() does it, without stale locks after a crash
         "--rerun-incomplete",
         "--keep-going",
-        "--log-handler-script", str(config.PAPER / "sgf_paper" / "progress.py"),
+        "--log-handler-script", str(paths.PAPER / "sgf_paper" / "progress.py"),
         "--config", *(f"{key}={value}" for key, value in values.items()),
     ]  # fmt: skip
 
@@ -270,8 +272,8 @@ def print_summary(
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="sgf_paper.run", description=__doc__)
     parser.add_argument("--bin", type=Path, required=True, help="folder of the programs")
-    parser.add_argument("--results", type=Path, default=config.PROJECT / "results")
-    parser.add_argument("--generated", type=Path, default=config.PROJECT / "datasets" / "generated")
+    parser.add_argument("--results", type=Path, default=paths.PROJECT / "results")
+    parser.add_argument("--generated", type=Path, default=paths.PROJECT / "datasets" / "generated")
     parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
     parser.add_argument("--cluster", choices=["slurm"], help="submit each job; --jobs at a time")
@@ -301,7 +303,7 @@ def main() -> int:
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]
         return 0 if make_stages(settings, stages) else 1
-    except (RunError, cluster.ClusterError, config.ConfigError) as error:
+    except (RunError, cluster.ClusterError, ConfigError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

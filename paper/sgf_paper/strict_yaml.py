@@ -119,3 +119,8 @@ def build_each(
     """Makes dataclass `cls` of each of some named YAML maps, by build() or build_typed()."""
     require(dict[str, Any], nodes, where)
     return {name: by(cls, node, f"{where}.{name}") for name, node in nodes.items()}
+
+
+def build_list(cls: type, nodes: list[dict[str, Any]], where: str) -> list[Any]:
+    """Makes dataclass `cls` of each of some YAML maps."""
+    return [build(cls, node, where) for node in nodes]

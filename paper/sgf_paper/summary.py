@@ -8,7 +8,8 @@ import pandas as pd
 
 from sgf_paper import bench, catalog, config, text, trajectory_table
 from sgf_paper.catalog import Source
-from sgf_paper.config import Dataset, Experiment
+from sgf_paper.config import Experiment
+from sgf_paper.stereo_datasets import Dataset
 
 FILES = {
     "table": "tables/{}.md (.csv, .tex, _scenes.csv, _wins.csv, _tuned.csv)",

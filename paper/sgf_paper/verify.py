@@ -23,14 +23,15 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from sgf_paper import config, record
+from sgf_paper import paths, record
 from sgf_paper import run as run_module
 from sgf_paper.progress import clock
+from sgf_paper.strict_yaml import read_yaml
 
 CONDITIONS = ("code", "inputs", "packages", "processor", "build")
 TIMED = re.compile(r"timings?\b|_timings\.|bench_")  # files that say how long something took
 PICTURES = (".png", ".pdf", ".ply", ".pfm", ".db")
-TOLERANCES = config.PAPER / "tolerances.yaml"
+TOLERANCES = paths.PAPER / "tolerances.yaml"
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -67,7 +68,7 @@ class Recorded:
 
 
 def load_tolerances() -> list[Tolerance]:
-    return [Tolerance(**node) for node in config.read_yaml(TOLERANCES)["tolerances"]]
+    return [Tolerance(**node) for node in read_yaml(TOLERANCES)["tolerances"]]
 
 
 # --- the sample -----------------------------------------------------------------------------------
@@ -131,7 +132,7 @@ def repeat(run: Recorded, results: Path, scratch: Path) -> int:
     show_results(results, scratch, outputs)
     for output in run.node["outputs"]:
         (scratch / output).parent.mkdir(parents=True, exist_ok=True)
-    environment = {**run_module.environment(results), "PYTHONPATH": str(config.PAPER)}
+    environment = {**run_module.environment(results), "PYTHONPATH": str(paths.PAPER)}
     with (scratch / "log.txt").open("w") as log:
         done = subprocess.run(run.node["command"], cwd=scratch, env=environment, stdout=log, stderr=log)
     return done.returncode
@@ -254,7 +255,7 @@ def verify(results: Path, seed: int, minutes: float) -> bool:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="sgf_paper.verify", description=__doc__)
-    parser.add_argument("--results", type=Path, default=config.PROJECT / "results")
+    parser.add_argument("--results", type=Path, default=paths.PROJECT / "results")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--minutes", type=float, default=10, help="that the runs took when they were recorded")
     arguments = parser.parse_args()

@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
-from sgf_paper import catalog, config
-from sgf_paper.config import ConfigError
+from sgf_paper import catalog, paths
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
 VALID = {
     "archives": {"a.zip": {"urls": ["https://example.org/a.zip"], "bytes": 7}, "hand.zip": {}},
@@ -102,7 +102,7 @@ def own():
 
 
 def test_every_stereo_data_set_has_an_entry_that_unpacks_to_where_it_is_looked_for(own):
-    for name, layout in config.read_yaml(config.STEREO_LAYOUTS).items():
+    for name, layout in read_yaml(paths.STEREO_LAYOUTS).items():
         assert own.datasets[name].folder == layout["folders"][0], name
 
 
@@ -134,5 +134,5 @@ def test_experiments_name_what_is_fetched_for_them(own):
     assert catalog.needed_by(["fig1"], own) == ["icl_nuim_lr_kt2"]
     assert catalog.needed_by(["table3"], own) == own.groups["euroc"]  # through the tables that it joins
     assert catalog.needed_by(["scenes"], own) == []
-    every = [path.stem for path in config.EXPERIMENTS.glob("*.yaml")]
+    every = [path.stem for path in paths.EXPERIMENTS.glob("*.yaml")]
     assert set(catalog.needed_by(every, own)) == {*own.groups["paper"], "middlebury2014_q"}

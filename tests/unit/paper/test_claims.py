@@ -8,13 +8,14 @@ import pandas as pd
 import pytest
 import yaml
 
-from sgf_paper import claims, comparison, config, pairs
+from sgf_paper import claims, comparison, config, pairs, paths
 from sgf_paper.claims import FAILS, FEW, HOLDS, MISSING, OPEN, ClaimError, Outcome
-from sgf_paper.config import Claim, ConfigError, Interval, Ordering, Paired, ReportPairs, Value
 from sgf_paper.pairs import Rule
+from sgf_paper.report_config import Claim, Interval, Ordering, Paired, ReportPairs, Value, load_claims
+from sgf_paper.strict_yaml import ConfigError
 
 RULE = Rule(least=10, margin_pct=5)
-CLAIMS = config.load_claims()
+CLAIMS = load_claims()
 EVERY = [*CLAIMS.claims, *CLAIMS.slips, *CLAIMS.new]
 ORDER = Ordering("t", "cost", "error", "sgf", ["sad", "pm"], groups=["frame"])
 PAIR = Paired("t", "cost", "error", "sgf", ["sad"], pairs=["scene"], clusters=["scene"])
@@ -246,11 +247,11 @@ def test_every_statement_has_a_check_or_says_why_not():
 
 @pytest.mark.parametrize("claim", EVERY, ids=[claim.id for claim in EVERY])
 def test_checks_fit_the_tables_they_read(claim):
-    finding = claims.judge(claim, {"reference": claims.Tables(config.REFERENCE)}, comparison.PublishedRows(), RULE)
+    finding = claims.judge(claim, {"reference": claims.Tables(paths.REFERENCE)}, comparison.PublishedRows(), RULE)
     if finding.published:
         assert MISSING not in {outcome.state for outcome in finding.published.outcomes}
     for check in claim.checks:
-        name = next(path.stem for path in config.EXPERIMENTS.glob("*.yaml") if is_made_by(check.table, path.stem))
+        name = next(path.stem for path in paths.EXPERIMENTS.glob("*.yaml") if is_made_by(check.table, path.stem))
         assert config.load_experiment(name).kind != "report"
 
 
@@ -289,7 +290,7 @@ def test_mistakes_in_claims_are_named(tmp_path, change, message):
     path = tmp_path / "claims.yaml"
     path.write_text(yaml.safe_dump({"claims": [claim], "slips": [], "new": []}))
     with pytest.raises(ConfigError, match=message):
-        config.load_claims(path)
+        load_claims(path)
 
 
 def test_a_name_stands_for_one_statement(tmp_path):
@@ -297,4 +298,4 @@ def test_a_name_stands_for_one_statement(tmp_path):
     path = tmp_path / "claims.yaml"
     path.write_text(yaml.safe_dump({"claims": [claim], "slips": [], "new": [claim]}))
     with pytest.raises(ConfigError, match=r"\['c'\] is there twice"):
-        config.load_claims(path)
+        load_claims(path)

@@ -3,11 +3,13 @@
 import pytest
 import yaml
 
-from sgf_paper import config
-from sgf_paper.config import ConfigError, Dataset
+from sgf_paper import config, paths
+from sgf_paper.stereo_config import load_published
+from sgf_paper.stereo_datasets import Dataset, read_datasets
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
-NAMES = sorted(path.stem for path in config.EXPERIMENTS.glob("*.yaml"))
-TABLE1 = yaml.safe_load((config.EXPERIMENTS / "table1.yaml").read_text())
+NAMES = sorted(path.stem for path in paths.EXPERIMENTS.glob("*.yaml"))
+TABLE1 = yaml.safe_load((paths.EXPERIMENTS / "table1.yaml").read_text())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -17,7 +19,7 @@ def test_every_experiment_is_read_and_named_after_its_file(name):
 
 def test_columns_of_the_paper_come_first_and_in_its_order():
     for table in config.load_experiments("table").values():
-        paper = list(config.load_published(table, "stereo_bm")["mean_px"])
+        paper = list(load_published(table, "stereo_bm")["mean_px"])
         for sweep in table.sweeps:
             assert sweep.main_columns == paper == list(sweep.columns)[: len(paper)]
 
@@ -32,11 +34,11 @@ def test_tables_have_the_papers_two_matchers_and_semi_global_matching(name):
 
 def test_published_values_are_the_papers():
     table = config.load_experiment("table1")
-    published = config.load_published(table, "stereo_bm")
+    published = load_published(table, "stereo_bm")
     assert published["mean_px"]["sgf"] == 3.29
     assert published["invalid_pct"]["orig"] == 40.44
-    assert config.load_published(table, "mesh_stereo")["bad4_pct"]["sgf"] == 12.53
-    assert config.load_published(table, "") == {}
+    assert load_published(table, "mesh_stereo")["bad4_pct"]["sgf"] == 12.53
+    assert load_published(table, "") == {}
 
 
 def test_own_parameters_replace_the_shared_ones():
@@ -89,13 +91,13 @@ def test_unreadable_yaml_names_its_file(experiments):
 def test_an_unknown_published_entry_is_an_error(table):
     table.published = "table_7"
     with pytest.raises(ConfigError, match="no entry table_7.stereo_bm"):
-        config.load_published(table, "stereo_bm")
+        load_published(table, "stereo_bm")
 
 
 def test_listing_of_datasets(tmp_path):
     listing = tmp_path / "datasets.tsv"
     listing.write_text("a\t/data/with blank/a\t3\nb\t/data/b\t11\n")
-    found = config.read_datasets(listing)
+    found = read_datasets(listing)
     assert [(d.name, str(d.folder), d.scenes) for d in found.values()] == [
         ("a", "/data/with blank/a", 3),
         ("b", "/data/b", 11),
@@ -142,11 +144,11 @@ def test_a_text_that_is_no_yaml_is_an_error_with_its_file(tmp_path, text, messag
     file = tmp_path / "text.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError, match="text.yaml: ") as error:
-        config.read_yaml(file)
+        read_yaml(file)
     assert message in str(error.value)
 
 
 def test_bytes_that_are_no_text_are_an_error(tmp_path):
     (tmp_path / "text.yaml").write_bytes(b"a: \xff")
     with pytest.raises(ConfigError, match="text.yaml: .*can't decode"):
-        config.read_yaml(tmp_path / "text.yaml")
+        read_yaml(tmp_path / "text.yaml")

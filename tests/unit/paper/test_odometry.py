@@ -9,10 +9,10 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, odometry, odometry_scores, summary
-from sgf_paper.config import ConfigError
+from sgf_paper import config, odometry, odometry_scores, paths, summary
+from sgf_paper.strict_yaml import ConfigError
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "odometry.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "odometry.yaml").read_text())
 RENDERED = ["V1_03_difficult", "MH_03_medium"]
 # ATE in mm of three runs, lost where infinite: undisturbed and under light.
 ATE_MM = {

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from sgf_paper import claims, config, deviations, report, report_grid, style, summary, text
-from sgf_paper.config import ReportTable
+from sgf_paper import claims, config, deviations, paths, report, report_grid, style, summary, text
 from sgf_paper.deviations import Notes
+from sgf_paper.report_config import ReportTable, load_claims
 from sgf_paper.style import plt
 
 REPORT = config.load_experiment("report")
@@ -29,7 +29,7 @@ def make_results(root):
     tables, figures = root / "tables", root / "figures"
     for folder in (tables, figures, root / "raw" / "stereo_bm" / "debian_pairs"):
         folder.mkdir(parents=True)
-    for path in config.REFERENCE.glob("*.csv"):
+    for path in paths.REFERENCE.glob("*.csv"):
         if any(path.stem.startswith(name) for name in MADE) and not path.stem.startswith("table3_vio"):
             shutil.copy(path, tables)
     lines = pd.read_csv(tables / "table1_scenes.csv")
@@ -147,7 +147,7 @@ def test_each_claim_has_a_verdict_and_the_number_that_says_so(made):
     }  # fmt: skip
     assert "middlebury2014_q, sgf / orig: 0.52 [0.46, 0.60], 14 won, 1 lost, 0 tied of 15: better" in page
     verdicts = pd.read_csv(results / "tables" / "report_verdicts.csv")
-    assert len(verdicts[verdicts["chapter"] == "claims"]) == len(config.load_claims().claims)
+    assert len(verdicts[verdicts["chapter"] == "claims"]) == len(load_claims().claims)
     assert verdicts.notna().all().all()
 
 
@@ -168,7 +168,7 @@ def test_measured_on_the_papers_data_a_value_has_its_mark_beside_it(results, no_
 
 
 def test_failed_runs_are_shown(page):
-    runs = pd.read_csv(config.REFERENCE / "table3_dso_runs.csv")
+    runs = pd.read_csv(paths.REFERENCE / "table3_dso_runs.csv")
     assert runs["failed"].any()
     shown = page[page.index('id="sequence-MH_01_easy"') :]
     assert "∞" in shown

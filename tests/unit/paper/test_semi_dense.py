@@ -6,8 +6,9 @@ import pytest
 import yaml
 
 from sgf_paper import config, semi_dense_figure, summary
-from sgf_paper.config import ConfigError, SemiDenseRow
 from sgf_paper.semi_dense_figure import Frame, PlyError
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.study_config import SemiDenseRow
 
 HEADER = (
     "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"

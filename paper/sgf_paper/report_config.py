@@ -1,0 +1,186 @@
+"""What the report shows and claims."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Union
+
+from sgf_paper import paths
+from sgf_paper.strict_yaml import ConfigError, build, build_list, read_yaml
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """Lines of a CSV file that the report shows."""
+
+    table: str  # tables/<table>.csv
+    title: str
+    columns: list[str] = field(default_factory=list)  # empty: all
+    where: dict[str, Any] = field(default_factory=dict)  # values of columns, or lists of them
+    empty: dict[str, str] = field(default_factory=dict)  # why cells of a column may be empty
+    run: str = ""  # below the results, what made a line; {column} is a value of the line
+    only_html: bool = False  # long: not printed in the PDF
+
+
+@dataclass(frozen=True)
+class ReportItem:
+    """A table or figure, made by the experiment of the same name."""
+
+    name: str
+    place: str  # in the paper; empty for what it does not have
+    about: str
+    figures: list[str] = field(default_factory=list)  # figures/<figure>.png and .pdf
+    latex: list[str] = field(default_factory=list)  # tables/<table>.tex
+    tables: list[ReportTable] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class ReportPairs:
+    """Methods that are compared with each other, pair by pair."""
+
+    name: str  # experiment that has the methods
+    table: str  # tables/<table>.csv: a line a method and run, or scene
+    title: str
+    method: str  # column that names the method
+    quantity: str  # column of the error
+    groups: list[str]  # columns: each of their values is compared by itself
+    pairs: list[str]  # columns that two lines of a pair share
+    clusters: dict[str, list[str]]  # by name the columns whose values are independent draws
+
+
+@dataclass
+class Report:
+    """What the report shows, and what counts as decided."""
+
+    kind: str
+    name: str
+    title: str
+    datasets: dict[str, str]  # what each is
+    verdict_clusters: int  # fewer independent pairs give no verdict
+    margin_pct: float  # ratios nearer to 1 are equal
+    items: list[ReportItem]
+    pairs: list[ReportPairs]
+
+
+@dataclass(frozen=True)
+class Ordering:
+    """A method has the least value of all, line by line."""
+
+    table: str
+    method: str
+    quantity: str
+    best: str
+    among: list[str]
+    groups: list[str] = field(default_factory=list)
+    where: dict[str, Any] = field(default_factory=dict)
+    highest: bool = False  # or the greatest
+    count: str = ""  # column: runs or scenes that a value is of; fewer than a verdict takes decide nothing
+
+
+@dataclass(frozen=True)
+class Paired:
+    """A method has smaller errors than others, by intervals over pairs."""
+
+    table: str
+    method: str
+    quantity: str
+    best: str
+    among: list[str]
+    pairs: list[str]
+    clusters: list[str]
+    groups: list[str] = field(default_factory=list)
+    where: dict[str, Any] = field(default_factory=dict)
+    near_duplicates_of: str = ""  # table whose near-duplicates are one cluster
+
+
+@dataclass(frozen=True)
+class Interval:
+    """An interval that a table has lies on one side of a number."""
+
+    table: str
+    estimate: str  # columns
+    low: str
+    high: str
+    count: str  # column: how many pairs it is of
+    groups: list[str] = field(default_factory=list)
+    where: dict[str, Any] = field(default_factory=dict)
+    above: float | None = None
+    below: float | None = None
+
+
+@dataclass(frozen=True)
+class Value:
+    """Values are within limits."""
+
+    table: str
+    quantity: str
+    groups: list[str] = field(default_factory=list)
+    where: dict[str, Any] = field(default_factory=dict)
+    at_least: float | None = None
+    at_most: float | None = None
+
+
+Check = Union[Ordering, Paired, Interval, Value]
+CHECKS = {"ordering": Ordering, "paired": Paired, "interval": Interval, "value": Value}
+
+
+@dataclass
+class Claim:
+    """A statement, and what would show it."""
+
+    id: str
+    place: str  # in the paper, or where our text has it
+    says: str
+    checks: list[Check]  # on measured tables
+    published: list[Check] = field(default_factory=list)  # on the paper's own rows
+    allows: str = ""  # what these can and cannot show
+    note: str = ""
+
+
+@dataclass
+class Claims:
+    """Statements by chapter of the report."""
+
+    claims: list[Claim]  # the paper's
+    slips: list[Claim]  # suspected ones in the paper
+    new: list[Claim]  # ours
+
+
+def build_report(node: dict[str, Any], where: str) -> Report:
+    report = build(Report, node, where)
+    for item in report.items:
+        item["tables"] = build_list(ReportTable, item.get("tables", []), f"{where}: {item.get('name')}: tables")
+    report.items = build_list(ReportItem, report.items, f"{where}: items")
+    report.pairs = build_list(ReportPairs, report.pairs, f"{where}: pairs")
+    for name in [part.name for part in (*report.items, *report.pairs)]:
+        if not (paths.EXPERIMENTS / f"{name}.yaml").exists():
+            raise ConfigError(f"{where}: no experiment '{name}'")
+    return report
+
+
+def _build_check(node: dict[str, Any], where: str) -> Check:
+    kind = node.get("kind")
+    if kind not in CHECKS:
+        raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(CHECKS)}")
+    return build(CHECKS[kind], {key: value for key, value in node.items() if key != "kind"}, where)
+
+
+def _build_claim(node: dict[str, Any], where: str) -> Claim:
+    claim = build(Claim, node, where)
+    where = f"{where}.{claim.id}"
+    claim.checks = [_build_check(check, f"{where}: checks") for check in claim.checks]
+    claim.published = [_build_check(check, f"{where}: published") for check in claim.published]
+    return claim
+
+
+def load_claims(path: Path = paths.CLAIMS) -> Claims:
+    """Reads what is claimed and how it is checked."""
+    claims = build(Claims, read_yaml(path), str(path))
+    for chapter in ("claims", "slips", "new"):
+        nodes = getattr(claims, chapter)
+        setattr(claims, chapter, [_build_claim(node, f"{path}: {chapter}") for node in nodes])
+    names = [claim.id for chapter in (claims.claims, claims.slips, claims.new) for claim in chapter]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ConfigError(f"{path}: id {sorted(twice)} is there twice")
+    return claims

@@ -1,0 +1,247 @@
+"""Experiments of `sgf_study`, and those that show what is rendered."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sgf_paper import paths
+from sgf_paper.published_values import published_entry
+from sgf_paper.stereo_datasets import Dataset
+from sgf_paper.strict_yaml import ConfigError, build, build_each
+
+
+@dataclass(frozen=True)
+class SemiDenseRow:
+    """A row of panels: the points of a case, seen from where, coloured by what."""
+
+    title: str
+    case: str
+    view: str  # top or side
+    colour: str  # grey or error
+
+
+@dataclass(frozen=True)
+class SemiDenseColumn:
+    options: dict[str, Any]
+    extra: bool = False  # only a line of the table
+
+
+@dataclass
+class SemiDense:
+    """What `sgf_study semi-dense` runs and how its points are drawn."""
+
+    kind: str
+    name: str
+    title: str
+    pair: str  # below the folder of generated data sets
+    study: dict[str, Any]
+    cases: dict[str, Any]
+    rows: list[SemiDenseRow]
+    columns: dict[str, SemiDenseColumn]
+
+    @property
+    def drawn(self) -> list[str]:
+        """Names of the columns that the figure has, in order."""
+        return [name for name, column in self.columns.items() if not column.extra]
+
+    @property
+    def bad_pct(self) -> float:
+        """A depth is bad when off by more, in percent of the truth."""
+        return self.study["bad_pct"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """An image that is matched against a changed copy of itself."""
+
+    file: Path
+    generated: bool  # there once the pairs are rendered
+
+
+@dataclass(frozen=True)
+class FrameGroup:
+    """Images of one origin: downloaded, or views of the rendered pairs."""
+
+    name: str
+    title: str
+    frames: dict[str, str]  # by label the file below the folder of data, or of generated data
+    generated: bool = False
+    instead_of: str = ""  # group that this one stands in for
+
+    def files(self, root: Path) -> dict[str, Path]:
+        """Files by label. @param root the folder of data, or of generated data."""
+        return {label: root / file for label, file in self.frames.items()}
+
+
+@dataclass(frozen=True)
+class SelfMatchColumn:
+    metric: str
+    samples: dict[str, Any] = field(default_factory=dict)
+    pm: dict[str, Any] = field(default_factory=dict)
+    extra: bool = False  # not a column of the paper
+
+
+@dataclass
+class SelfMatch:
+    """What `sgf_study self-match` runs on each frame and how it is shown."""
+
+    kind: str
+    name: str
+    title: str
+    groups: list[FrameGroup]
+    published: str
+    published_group: str
+    figure_case: str
+    figure_columns: list[str]
+    matching: dict[str, Any]
+    columns: dict[str, SelfMatchColumn]
+    cases: dict[str, dict[str, Any]]
+    curves: dict[str, list[float]]
+
+    def present(self, data: str) -> list[FrameGroup]:
+        """The groups at hand: generated ones always are, downloaded ones where all files exist.
+
+        @param data folder with downloaded data, may be empty.
+        """
+        found = []
+        for group in self.groups:
+            files = group.files(Path(data)).values()
+            there = group.generated or data and all(file.exists() for file in files)
+            if there and group.instead_of not in [other.name for other in found]:
+                found.append(group)
+        return found
+
+    def frames(self, generated: Path, data: str) -> dict[str, Frame]:
+        """All frames at hand by `group_frame`."""
+        return {
+            f"{group.name}_{label}": Frame(file, group.generated)
+            for group in self.present(data)
+            for label, file in group.files(generated if group.generated else Path(data)).items()
+        }
+
+
+@dataclass(frozen=True)
+class ImageSet:
+    """Images that patches are tracked in: left images of data sets, and views of rendered pairs."""
+
+    title: str
+    datasets: list[str] = field(default_factory=list)  # all their pairs
+    rendered: list[str] = field(default_factory=list)
+
+    def files(self, generated: Path, datasets: dict[str, Dataset]) -> list[Path]:
+        """The images, data sets first. @param generated folder of generated data sets."""
+        left = [sorted(datasets[name].folder.glob("*/im0.png")) for name in self.datasets]
+        return sum(left, []) + [generated / "pairs" / name / "view.png" for name in self.rendered]
+
+
+@dataclass(frozen=True)
+class ConvergenceColumn:
+    residual: str
+    epsilon: dict[str, Any] = field(default_factory=dict)
+    compared: bool = False  # its converged tracks bound the common set
+
+
+@dataclass
+class Convergence:
+    """What `sgf_study convergence` runs and how it is shown."""
+
+    kind: str
+    name: str
+    title: str
+    image_sets: list[ImageSet]
+    study: dict[str, Any]
+    drawn: list[str]
+    table_start: dict[str, float]  # by unit
+    columns: dict[str, ConvergenceColumn]
+    cases: dict[str, dict[str, Any]]
+
+    def images(self, datasets: dict[str, Dataset]) -> ImageSet:
+        """The first set whose data sets were found."""
+        for images in self.image_sets:
+            if set(images.datasets) <= set(datasets):
+                return images
+        raise ConfigError(f"{self.name}: no image set is at hand")
+
+
+@dataclass
+class ShiftProfile:
+    """What `sgf_study shift-profile` runs."""
+
+    kind: str
+    name: str
+    title: str
+    study: dict[str, Any]
+
+
+@dataclass
+class ContactSheet:
+    """Views of the synthetic scenes."""
+
+    kind: str
+    name: str
+    title: str
+    scenes: dict[str, list[str]]  # names of views
+
+
+@dataclass
+class Sequences:
+    """Stereo-inertial sequences: recipes of datasets/synthetic."""
+
+    kind: str
+    name: str
+    title: str
+    short: list[str]
+    full: list[str]
+
+    def suite(self, full: bool) -> list[str]:
+        return self.full if full else self.short
+
+    def recipes(self, full: bool) -> list[Path]:
+        return [paths.RECIPES / f"{name}.yaml" for name in self.suite(full)]
+
+
+def build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
+    figure = build(SemiDense, node, where)
+    figure.rows = [build(SemiDenseRow, row, f"{where}: rows") for row in figure.rows]
+    figure.columns = build_each(SemiDenseColumn, figure.columns, f"{where}: columns")
+    for key in ("min_gradient", "min_epipolar_gradient", "bad_pct"):
+        if key not in figure.study:
+            raise ConfigError(f"{where}: study: key '{key}' is missing")
+    for row in figure.rows:
+        known = {"case": figure.cases, "view": ("top", "side"), "colour": ("grey", "error")}
+        for key, names in known.items():
+            if getattr(row, key) not in names:
+                raise ConfigError(f"{where}: rows: {key} '{getattr(row, key)}' is unknown")
+    return figure
+
+
+def build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
+    figure = build(SelfMatch, node, where)
+    figure.groups = [build(FrameGroup, group, f"{where}: groups") for group in figure.groups]
+    figure.columns = build_each(SelfMatchColumn, figure.columns, f"{where}: columns")
+    if figure.figure_case not in figure.cases:
+        raise ConfigError(f"{where}: figure_case '{figure.figure_case}' is not among the cases")
+    if unknown := set(figure.figure_columns) - set(figure.columns):
+        raise ConfigError(f"{where}: figure_columns: no column {sorted(unknown)}")
+    wanted = {figure.published_group, *(group.instead_of for group in figure.groups)} - {""}
+    if unknown := wanted - {group.name for group in figure.groups}:
+        raise ConfigError(f"{where}: no group {sorted(unknown)}")
+    return figure
+
+
+def build_convergence(node: dict[str, Any], where: str) -> Convergence:
+    study = build(Convergence, node, where)
+    study.image_sets = [build(ImageSet, images, f"{where}: image_sets") for images in study.image_sets]
+    if study.image_sets[-1].datasets:
+        raise ConfigError(f"{where}: image_sets: the last one must need no data set")
+    study.columns = build_each(ConvergenceColumn, study.columns, f"{where}: columns")
+    if unknown := set(study.drawn) - set(study.columns):
+        raise ConfigError(f"{where}: drawn: no column {sorted(unknown)}")
+    return study
+
+
+def load_published_errors(figure: SelfMatch) -> dict[str, list[float]]:
+    """The paper's mean errors (px) of Fig. 1 by column, one per frame of the paper."""
+    return published_entry(figure.published)
