@@ -1,27 +1,20 @@
 """The YAML files of paper/experiments as typed objects.
 
-Reading is strict: an unknown or a missing key, or a name that leads nowhere, is a ConfigError that
-names the file.
+Reading is strict: an unknown or a missing key, a value of another type, or a name that leads nowhere, is a ConfigError
+that names the file.
 """
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any, Union
+from typing import Annotated, Any, Union
 
 from sgf_paper import paths
-from sgf_paper.report_config import Report, build_report
-from sgf_paper.stereo_config import (
-    Benchmark, Density, DisparityFigure, LightChange, Table, build_figure, build_light_change, build_table,
-)  # fmt: skip
+from sgf_paper.report_config import Report
+from sgf_paper.stereo_config import Benchmark, Density, DisparityFigure, LightChange, Table
 from sgf_paper.strict_yaml import ConfigError, build, read_yaml
-from sgf_paper.study_config import (
-    ContactSheet, Convergence, SelfMatch, SemiDense, Sequences, ShiftProfile, build_convergence, build_self_match,
-    build_semi_dense,
-)  # fmt: skip
+from sgf_paper.study_config import ContactSheet, Convergence, SelfMatch, SemiDense, Sequences, ShiftProfile
 from sgf_paper.tracking_config import (
-    DirectMap, JoinedTable, MrptMap, Odometry, TrackingTuning, TrajectoryTable, build_direct_map, build_joined_table,
-    build_odometry, build_on_sequences, build_trajectory_table, build_tuning,
+    DirectMap, JoinedTable, MrptMap, Odometry, TrackingTuning, TrajectoryTable, build_tuning,
 )  # fmt: skip
 
 Experiment = Union[
@@ -29,25 +22,25 @@ Experiment = Union[
     JoinedTable, MrptMap, Odometry, Report, SemiDense, SelfMatch, ShiftProfile, TrackingTuning, TrajectoryTable,
 ]
 
-BUILDERS = {
-    "benchmark": partial(build, Benchmark),
-    "contact_sheet": partial(build, ContactSheet),
-    "convergence": build_convergence,
-    "density": partial(build, Density),
-    "direct_map": build_direct_map,
-    "disparity_figure": build_figure,
-    "joined_table": build_joined_table,
-    "light_change": build_light_change,
-    "mrpt_map": partial(build_on_sequences, MrptMap),
-    "odometry": build_odometry,
-    "report": build_report,
-    "self_match": build_self_match,
-    "semi_dense": build_semi_dense,
-    "sequences": partial(build, Sequences),
-    "shift_profile": partial(build, ShiftProfile),
-    "table": build_table,
-    "trajectory_table": build_trajectory_table,
-    "tuning": build_tuning,
+KINDS = {
+    "benchmark": Benchmark,
+    "contact_sheet": ContactSheet,
+    "convergence": Convergence,
+    "density": Density,
+    "direct_map": DirectMap,
+    "disparity_figure": DisparityFigure,
+    "joined_table": JoinedTable,
+    "light_change": LightChange,
+    "mrpt_map": MrptMap,
+    "odometry": Odometry,
+    "report": Report,
+    "self_match": SelfMatch,
+    "semi_dense": SemiDense,
+    "sequences": Sequences,
+    "shift_profile": ShiftProfile,
+    "table": Table,
+    "trajectory_table": TrajectoryTable,
+    "tuning": Annotated[TrackingTuning, build_tuning],
 }
 
 
@@ -56,9 +49,9 @@ def load_experiment(name: str) -> Experiment:
     path = paths.EXPERIMENTS / f"{name}.yaml"
     node, where = read_yaml(path), str(path)
     kind = str(node.get("kind"))
-    if kind not in BUILDERS:
-        raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(BUILDERS)}")
-    return BUILDERS[kind](node, where)
+    if kind not in KINDS:
+        raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(KINDS)}")
+    return build(KINDS[kind], node, where)
 
 
 def load_experiments(kind: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sgf_paper import paths
-from sgf_paper.strict_yaml import ConfigError, build_each, build_list, read_yaml
+from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,8 @@ def published_entry(name: str) -> Any:
 
 def load_comparisons() -> dict[str, Comparison]:
     """How published tables are compared, by their entry in the published values."""
-    where = f"{paths.PUBLISHED}: comparison"
-    comparisons = build_each(Comparison, published_entry("comparison"), where)
-    for name, comparison in comparisons.items():
+    nodes = published_entry("comparison")
+    comparisons = build(dict[str, Comparison], nodes, f"{paths.PUBLISHED}: comparison")
+    for name in comparisons:
         published_entry(name)
-        comparison.tolerances = build_list(Tolerance, comparison.tolerances, f"{where}.{name}: tolerances")
     return comparisons

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Union
+from typing import Annotated, Any, Union
 
 from sgf_paper import paths
-from sgf_paper.strict_yaml import ConfigError, build, build_list, read_yaml
+from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,11 @@ class Report:
     margin_pct: float  # ratios nearer to 1 are equal
     items: list[ReportItem]
     pairs: list[ReportPairs]
+
+    def check(self, where: str) -> None:
+        for name in [part.name for part in (*self.items, *self.pairs)]:
+            if not (paths.EXPERIMENTS / f"{name}.yaml").exists():
+                raise ConfigError(f"{where}: no experiment '{name}'")
 
 
 @dataclass(frozen=True)
@@ -125,6 +130,15 @@ Check = Union[Ordering, Paired, Interval, Value]
 CHECKS = {"ordering": Ordering, "paired": Paired, "interval": Interval, "value": Value}
 
 
+def _build_check(node: Any, where: str) -> Check:
+    """Makes the check that a YAML map's `kind` says."""
+    values = dict(build(dict[str, Any], node, where))
+    kind = build(str, values.pop("kind", None), f"{where}.kind")
+    if kind not in CHECKS:
+        raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(CHECKS)}")
+    return build(CHECKS[kind], values, where)
+
+
 @dataclass
 class Claim:
     """A statement, and what would show it."""
@@ -132,8 +146,8 @@ class Claim:
     id: str
     place: str  # in the paper, or where our text has it
     says: str
-    checks: list[Check]  # on measured tables
-    published: list[Check] = field(default_factory=list)  # on the paper's own rows
+    checks: list[Annotated[Check, _build_check]]  # on measured tables
+    published: list[Annotated[Check, _build_check]] = field(default_factory=list)  # on the paper's own rows
     allows: str = ""  # what these can and cannot show
     note: str = ""
 
@@ -146,41 +160,12 @@ class Claims:
     slips: list[Claim]  # suspected ones in the paper
     new: list[Claim]  # ours
 
-
-def build_report(node: dict[str, Any], where: str) -> Report:
-    report = build(Report, node, where)
-    for item in report.items:
-        item["tables"] = build_list(ReportTable, item.get("tables", []), f"{where}: {item.get('name')}: tables")
-    report.items = build_list(ReportItem, report.items, f"{where}: items")
-    report.pairs = build_list(ReportPairs, report.pairs, f"{where}: pairs")
-    for name in [part.name for part in (*report.items, *report.pairs)]:
-        if not (paths.EXPERIMENTS / f"{name}.yaml").exists():
-            raise ConfigError(f"{where}: no experiment '{name}'")
-    return report
-
-
-def _build_check(node: dict[str, Any], where: str) -> Check:
-    kind = node.get("kind")
-    if kind not in CHECKS:
-        raise ConfigError(f"{where}: kind is '{kind}'; known: {', '.join(CHECKS)}")
-    return build(CHECKS[kind], {key: value for key, value in node.items() if key != "kind"}, where)
-
-
-def _build_claim(node: dict[str, Any], where: str) -> Claim:
-    claim = build(Claim, node, where)
-    where = f"{where}.{claim.id}"
-    claim.checks = [_build_check(check, f"{where}: checks") for check in claim.checks]
-    claim.published = [_build_check(check, f"{where}: published") for check in claim.published]
-    return claim
+    def check(self, where: str) -> None:
+        names = [claim.id for claim in (*self.claims, *self.slips, *self.new)]
+        if twice := {name for name in names if names.count(name) > 1}:
+            raise ConfigError(f"{where}: id {sorted(twice)} is there twice")
 
 
 def load_claims(path: Path = paths.CLAIMS) -> Claims:
     """Reads what is claimed and how it is checked."""
-    claims = build(Claims, read_yaml(path), str(path))
-    for chapter in ("claims", "slips", "new"):
-        nodes = getattr(claims, chapter)
-        setattr(claims, chapter, [_build_claim(node, f"{path}: {chapter}") for node in nodes])
-    names = [claim.id for chapter in (claims.claims, claims.slips, claims.new) for claim in chapter]
-    if twice := {name for name in names if names.count(name) > 1}:
-        raise ConfigError(f"{path}: id {sorted(twice)} is there twice")
-    return claims
+    return build(Claims, read_yaml(path), str(path))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from sgf_paper import paths
 from sgf_paper.stereo_datasets import Dataset
-from sgf_paper.strict_yaml import ConfigError, build, build_each, read_yaml
+from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,16 @@ class Sweep:
         return {**shared, **column.options}
 
 
+def load_sweep(name: str) -> Sweep:
+    """Reads paper/sweeps/<name>.yaml."""
+    path = paths.SWEEPS / f"{name}.yaml"
+    return build(Sweep, read_yaml(path), str(path))
+
+
+def _named_sweep(name: Any, where: str) -> Sweep:
+    return load_sweep(build(str, name, where))
+
+
 @dataclass(frozen=True)
 class Parameters:
     window: int  # px
@@ -75,7 +85,7 @@ class Tuning:
 class TableBlock:
     """The columns of one sweep in a table."""
 
-    sweep: Sweep  # by its name in the file
+    sweep: Annotated[Sweep, _named_sweep]  # by its name in the file
     fixed: dict[str, Any]
     fixed_of: dict[str, dict[str, Any]] = field(default_factory=dict)
     tuning: Tuning | None = None
@@ -84,6 +94,17 @@ class TableBlock:
     def parameters(self, column: str) -> Parameters:
         """The fixed parameters of a column."""
         return Parameters(**{**self.fixed, **self.fixed_of.get(column, {})})
+
+    def check(self, where: str) -> None:
+        if unknown := set(self.fixed_of) - set(self.sweep.columns):
+            raise ConfigError(f"{where}: fixed_of: no column {sorted(unknown)} in sweep {self.sweep.name}")
+        for column in self.sweep.columns:
+            values = {**self.fixed, **self.fixed_of.get(column, {})}
+            parameters = build(Parameters, values, f"{where}: fixed, of {column}")
+            if parameters.window not in self.sweep.grid.windows:
+                raise ConfigError(f"{where}: window {parameters.window} is not on the sweep's grid")
+            if parameters.uniqueness not in self.sweep.grid.uniqueness:
+                raise ConfigError(f"{where}: uniqueness {parameters.uniqueness} is not on the sweep's grid")
 
 
 @dataclass
@@ -123,6 +144,12 @@ class Table:
         return [name for name in self.datasets if name not in datasets]
 
 
+def load_table(name: str) -> Table:
+    """Reads the table of paper/experiments/<name>.yaml."""
+    path = paths.EXPERIMENTS / f"{name}.yaml"
+    return build(Table, read_yaml(path), str(path))
+
+
 @dataclass
 class Density:
     kind: str
@@ -145,6 +172,11 @@ class LightChange:
     columns: list[str]
     twins: dict[str, str]  # scenes taken under a change: the same scene without it, or empty
     changes: dict[str, dict[str, Any]]  # made to right images
+
+    def check(self, where: str) -> None:
+        for sweep in load_table(self.table).sweeps:
+            if unknown := set(self.columns) - set(sweep.columns):
+                raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep.name}")
 
     def present(self, datasets: dict[str, Dataset]) -> list[str]:
         """Names of the data sets to run among those that were found."""
@@ -180,6 +212,11 @@ class DisparityFigure:
     columns: list[str]
     groups: list[SceneGroup]
 
+    def check(self, where: str) -> None:
+        for sweep in self.sweeps:
+            if unknown := set(self.columns) - set(load_sweep(sweep).columns):
+                raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep}")
+
     def group(self, datasets: dict[str, Dataset]) -> SceneGroup | None:
         """First group with a scene whose left image exists, cut down to such scenes."""
         for group in self.groups:
@@ -208,65 +245,6 @@ class Benchmark:
             return None
         folder = datasets[self.dataset].folder / self.scene
         return folder if folder.is_dir() else None
-
-
-def load_sweep(name: str) -> Sweep:
-    """Reads paper/sweeps/<name>.yaml."""
-    path = paths.SWEEPS / f"{name}.yaml"
-    sweep = build(Sweep, read_yaml(path), str(path))
-    sweep.grid = build(Grid, sweep.grid, f"{path}: grid")
-    sweep.columns = build_each(Column, sweep.columns, f"{path}: columns")
-    return sweep
-
-
-def _build_block(node: dict[str, Any], where: str) -> TableBlock:
-    block = build(TableBlock, node, where)
-    if block.tuning is not None:
-        block.tuning = build(Tuning, block.tuning, f"{where}: tuning")
-    build(Parameters, block.fixed, f"{where}: fixed")
-    block.sweep = load_sweep(block.sweep)
-    for column in block.sweep.columns:
-        parameters = block.parameters(column)
-        if parameters.window not in block.sweep.grid.windows:
-            raise ConfigError(f"{where}: window {parameters.window} is not on the sweep's grid")
-        if parameters.uniqueness not in block.sweep.grid.uniqueness:
-            raise ConfigError(f"{where}: uniqueness {parameters.uniqueness} is not on the sweep's grid")
-    return block
-
-
-def build_table(node: dict[str, Any], where: str) -> Table:
-    table = build(Table, node, where)
-    table.blocks = [_build_block(block, f"{where}: blocks") for block in table.blocks]
-    return table
-
-
-def _load_table(name: str) -> Table:
-    """Reads the table of paper/experiments/<name>.yaml."""
-    path = paths.EXPERIMENTS / f"{name}.yaml"
-    return build_table(read_yaml(path), str(path))
-
-
-def build_light_change(node: dict[str, Any], where: str) -> LightChange:
-    experiment = build(LightChange, node, where)
-    for sweep in _load_table(experiment.table).sweeps:
-        if unknown := set(experiment.columns) - set(sweep.columns):
-            raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep.name}")
-    return experiment
-
-
-def _build_group(node: dict[str, Any], where: str) -> SceneGroup:
-    group = build(SceneGroup, node, where)
-    scenes = [build(FigureScene, scene, f"{where}: scenes") for scene in group.scenes]
-    return SceneGroup(group.dataset, group.title, scenes)
-
-
-def build_figure(node: dict[str, Any], where: str) -> DisparityFigure:
-    figure = build(DisparityFigure, node, where)
-    figure.groups = [_build_group(group, f"{where}: groups") for group in figure.groups]
-    for sweep in figure.sweeps:
-        if unknown := set(figure.columns) - set(load_sweep(sweep).columns):
-            raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep}")
-    return figure
 
 
 def load_published(table: Table, matcher: str) -> dict[str, dict[str, float]]:

@@ -9,7 +9,7 @@ from typing import Any
 from sgf_paper import paths
 from sgf_paper.published_values import published_entry
 from sgf_paper.stereo_datasets import Dataset
-from sgf_paper.strict_yaml import ConfigError, build, build_each
+from sgf_paper.strict_yaml import ConfigError
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,16 @@ class SemiDense:
     cases: dict[str, Any]
     rows: list[SemiDenseRow]
     columns: dict[str, SemiDenseColumn]
+
+    def check(self, where: str) -> None:
+        for key in ("min_gradient", "min_epipolar_gradient", "bad_pct"):
+            if key not in self.study:
+                raise ConfigError(f"{where}: study: key '{key}' is missing")
+        for index, row in enumerate(self.rows):
+            known = {"case": self.cases, "view": ("top", "side"), "colour": ("grey", "error")}
+            for key, names in known.items():
+                if getattr(row, key) not in names:
+                    raise ConfigError(f"{where}: rows[{index}]: {key} '{getattr(row, key)}' is unknown")
 
     @property
     def drawn(self) -> list[str]:
@@ -100,6 +110,15 @@ class SelfMatch:
     cases: dict[str, dict[str, Any]]
     curves: dict[str, list[float]]
 
+    def check(self, where: str) -> None:
+        if self.figure_case not in self.cases:
+            raise ConfigError(f"{where}: figure_case '{self.figure_case}' is not among the cases")
+        if unknown := set(self.figure_columns) - set(self.columns):
+            raise ConfigError(f"{where}: figure_columns: no column {sorted(unknown)}")
+        wanted = {self.published_group, *(group.instead_of for group in self.groups)} - {""}
+        if unknown := wanted - {group.name for group in self.groups}:
+            raise ConfigError(f"{where}: no group {sorted(unknown)}")
+
     def present(self, data: str) -> list[FrameGroup]:
         """The groups at hand: generated ones always are, downloaded ones where all files exist.
 
@@ -157,6 +176,12 @@ class Convergence:
     columns: dict[str, ConvergenceColumn]
     cases: dict[str, dict[str, Any]]
 
+    def check(self, where: str) -> None:
+        if not self.image_sets or self.image_sets[-1].datasets:
+            raise ConfigError(f"{where}: image_sets: the last one must need no data set")
+        if unknown := set(self.drawn) - set(self.columns):
+            raise ConfigError(f"{where}: drawn: no column {sorted(unknown)}")
+
     def images(self, datasets: dict[str, Dataset]) -> ImageSet:
         """The first set whose data sets were found."""
         for images in self.image_sets:
@@ -200,46 +225,6 @@ class Sequences:
 
     def recipes(self, full: bool) -> list[Path]:
         return [paths.RECIPES / f"{name}.yaml" for name in self.suite(full)]
-
-
-def build_semi_dense(node: dict[str, Any], where: str) -> SemiDense:
-    figure = build(SemiDense, node, where)
-    figure.rows = [build(SemiDenseRow, row, f"{where}: rows") for row in figure.rows]
-    figure.columns = build_each(SemiDenseColumn, figure.columns, f"{where}: columns")
-    for key in ("min_gradient", "min_epipolar_gradient", "bad_pct"):
-        if key not in figure.study:
-            raise ConfigError(f"{where}: study: key '{key}' is missing")
-    for row in figure.rows:
-        known = {"case": figure.cases, "view": ("top", "side"), "colour": ("grey", "error")}
-        for key, names in known.items():
-            if getattr(row, key) not in names:
-                raise ConfigError(f"{where}: rows: {key} '{getattr(row, key)}' is unknown")
-    return figure
-
-
-def build_self_match(node: dict[str, Any], where: str) -> SelfMatch:
-    figure = build(SelfMatch, node, where)
-    figure.groups = [build(FrameGroup, group, f"{where}: groups") for group in figure.groups]
-    figure.columns = build_each(SelfMatchColumn, figure.columns, f"{where}: columns")
-    if figure.figure_case not in figure.cases:
-        raise ConfigError(f"{where}: figure_case '{figure.figure_case}' is not among the cases")
-    if unknown := set(figure.figure_columns) - set(figure.columns):
-        raise ConfigError(f"{where}: figure_columns: no column {sorted(unknown)}")
-    wanted = {figure.published_group, *(group.instead_of for group in figure.groups)} - {""}
-    if unknown := wanted - {group.name for group in figure.groups}:
-        raise ConfigError(f"{where}: no group {sorted(unknown)}")
-    return figure
-
-
-def build_convergence(node: dict[str, Any], where: str) -> Convergence:
-    study = build(Convergence, node, where)
-    study.image_sets = [build(ImageSet, images, f"{where}: image_sets") for images in study.image_sets]
-    if study.image_sets[-1].datasets:
-        raise ConfigError(f"{where}: image_sets: the last one must need no data set")
-    study.columns = build_each(ConvergenceColumn, study.columns, f"{where}: columns")
-    if unknown := set(study.drawn) - set(study.columns):
-        raise ConfigError(f"{where}: drawn: no column {sorted(unknown)}")
-    return study
 
 
 def load_published_errors(figure: SelfMatch) -> dict[str, list[float]]:

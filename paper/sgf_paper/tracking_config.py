@@ -5,12 +5,13 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from sgf_paper import paths
 from sgf_paper.published_values import published_entry
-from sgf_paper.strict_yaml import ConfigError, build, build_each, read_yaml
+from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
 FIRST_FRAME_STEP = 7  # between runs of odometry
 TUNING_SEED = 1000  # that of a table's run and this make that of a run which options are tuned on
@@ -86,6 +87,13 @@ class OffSurface:
     cell_m: float  # side of the cells that a spread is taken in
     cell_points: int  # a cell with fewer has no spread
 
+    def check(self, where: str) -> None:
+        limits = self.doubled_m
+        if len(limits) != 2 or not 0 <= limits[0] < limits[1]:
+            raise ConfigError(f"{where}: doubled_m is {limits}; it has to be two distances, least first")
+        if self.cell_m <= 0 or self.cell_points < 2:
+            raise ConfigError(f"{where}: cells have to have a size and two points or more")
+
 
 @dataclass
 class DirectMap(SequenceExperiment):
@@ -119,8 +127,18 @@ class RepeatedRuns(SequenceExperiment, ABC):
     lost_below_pct: float  # frames with a pose
     compared: list[str]
     baselines: list[str]
-    conditions: dict[str, Any]
-    columns: dict[str, Any]
+    conditions: dict[str, dict[str, Any]]
+    columns: dict[str, dict[str, Any]]
+
+    def check(self, where: str) -> None:
+        for key in ("compared", "baselines"):
+            if unknown := set(getattr(self, key)) - set(self.columns):
+                raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
+        for key in ("runs", "first_frames"):
+            if getattr(self, key) < 1:
+                raise ConfigError(f"{where}: {key} is {getattr(self, key)}; it has to be positive")
+        if not self.conditions or any(self.change(sequence, self.undisturbed) for sequence in self.sequences):
+            raise ConfigError(f"{where}: conditions: the first one must change nothing")
 
     @property
     def undisturbed(self) -> str:
@@ -245,12 +263,24 @@ class TrajectoryTable(RepeatedRuns):
 
     SCORES_OWN = True
 
+    sequences: dict[str, TableSequence]
+    conditions: dict[str, TrackingCondition]
+    columns: dict[str, TrackingColumn]
     fail_above_pct: float  # ATE RMSE over the length of the path
     verdict_runs: int  # fewer give no verdict
     margin_pct: float
     published: str
     programs: dict[str, TrackingProgram]
     tuned: bool = False  # options on top of the columns' own: those tuned on the fold without the sequence
+
+    def check(self, where: str) -> None:
+        for name, column in self.columns.items():
+            if column.program not in self.programs:
+                raise ConfigError(f"{where}: columns.{name}: no program '{column.program}'")
+        for name, condition in self.conditions.items():
+            if unknown := set(condition.changes) - set(self.sequences):
+                raise ConfigError(f"{where}: conditions.{name}: no sequence {sorted(unknown)}")
+        super().check(where)
 
     def change(self, sequence: str, condition: str) -> dict[str, Any] | None:
         changes = self.conditions[condition].changes
@@ -271,12 +301,26 @@ class TrajectoryTable(RepeatedRuns):
         return _command_line({"frame": program.frame, "align": program.align})
 
 
+def _load_table(name: Any, where: str, **instead: Any) -> TrajectoryTable:
+    """Reads the trajectory table of paper/experiments/<name>.yaml. @param instead of what is there."""
+    path = paths.EXPERIMENTS / f"{build(str, name, where)}.yaml"
+    node = read_yaml(path)
+    if node.get("kind") != "trajectory_table":
+        raise ConfigError(f"{where}: {name} is no trajectory_table")
+    return build(TrajectoryTable, {**node, **instead}, str(path))
+
+
 @dataclass(frozen=True)
 class ExternalSystem:
     """How the trajectories of another system are scored."""
 
     frame: str = "body"  # that its poses are of: body or camera
     align: str = "se3"  # or sim3 where its scale is not known
+
+    def check(self, where: str) -> None:
+        for key, known in {"frame": ("body", "camera"), "align": ("se3", "sim3")}.items():
+            if getattr(self, key) not in known:
+                raise ConfigError(f"{where}: {key} is {getattr(self, key)!r}; known: {', '.join(known)}")
 
 
 @dataclass
@@ -286,8 +330,19 @@ class JoinedTable:
     kind: str
     name: str
     title: str
-    parts: dict[str, TrajectoryTable]  # by what names of their systems begin with; by name in the file
+    parts: dict[str, Annotated[TrajectoryTable, _load_table]]  # by what systems' names begin with; by name in the file
     published: list[str]  # rows of the paper's table that are systems of their own
+
+    def check(self, where: str) -> None:
+        if not self.parts:
+            raise ConfigError(f"{where}: parts: there are none")
+        for part in self.parts.values():
+            for key in ("lost_below_pct", "fail_above_pct", "published"):
+                if getattr(part, key) != getattr(self.rule, key):
+                    names = f"{part.name} differs from that of {self.rule.name}"
+                    raise ConfigError(f"{where}: parts: {key} of {names}")
+        if unknown := set(self.published) - set(load_published_rows(self.rule)):
+            raise ConfigError(f"{where}: published: the paper has no row {sorted(unknown)}")
 
     @property
     def sequences(self) -> list[TableSequence]:
@@ -309,6 +364,10 @@ class SearchRange:
     log: bool = False  # by factors, not by steps
     integer: bool = False
 
+    def check(self, where: str) -> None:
+        if not self.low < self.high or (self.log and self.low <= 0):
+            raise ConfigError(f"{where}: no range from {self.low} to {self.high}")
+
 
 @dataclass(frozen=True)
 class TuningBudget:
@@ -319,6 +378,11 @@ class TuningBudget:
     held_out_runs: int  # the same on the other fold, of the defaults and of what was found
     frames: int  # of a run
 
+    def check(self, where: str) -> None:
+        for name, count in asdict(self).items():
+            if count < 1:
+                raise ConfigError(f"{where}: {name} is {count}; it has to be positive")
+
 
 @dataclass
 class TrackingTuning:
@@ -327,7 +391,7 @@ class TrackingTuning:
     kind: str
     name: str
     title: str
-    table: TrajectoryTable  # by its name in the file; its columns are taken without options tuned before
+    table: Annotated[TrajectoryTable, partial(_load_table, tuned=False)]  # by name in the file; columns' own options
     folder: str  # of what is found, below the results
     folds: list[list[str]]  # all sequences of the table; those rendered are tuned on
     conditions: list[str]
@@ -337,6 +401,19 @@ class TrackingTuning:
     columns: list[str] = field(default_factory=list)  # empty: all of the table
     by_name_only: bool = False  # reproduce.sh runs it only if told to
     like: str = ""  # experiment that has the keys left out here
+
+    def __post_init__(self) -> None:
+        self.columns = self.columns or list(self.table.columns)
+
+    def check(self, where: str) -> None:
+        table = self.table
+        if len(self.folds) != 2 or sorted(sum(self.folds, [])) != sorted(table.sequences):
+            raise ConfigError(f"{where}: folds: each sequence of {table.name} has to be in one of two folds")
+        if not all(self.rendered(fold) for fold in (0, 1)):
+            raise ConfigError(f"{where}: folds: each needs a rendered sequence")
+        for key, known in (("conditions", table.conditions), ("columns", table.columns)):
+            if unknown := set(getattr(self, key)) - set(known):
+                raise ConfigError(f"{where}: {key}: {table.name} has no {sorted(unknown)}")
 
     @property
     def files(self) -> list[str]:
@@ -361,107 +438,11 @@ class TrackingTuning:
         return _command_line(values | {"from": first_frame, "frames": self.budget.frames})
 
 
-def build_on_sequences(cls: type, node: dict[str, Any], where: str, of: type = TrackedSequence) -> Any:
-    """Makes dataclass `cls`, a SequenceExperiment on sequences `of` a class, of a YAML map."""
-    experiment = build(cls, node, where)
-    experiment.sequences = build_each(of, experiment.sequences, f"{where}: sequences")
-    return experiment
-
-
-def build_direct_map(node: dict[str, Any], where: str) -> DirectMap:
-    figure = build_on_sequences(DirectMap, node, where)
-    figure.points = build(MapPoints, figure.points, f"{where}: points")
-    figure.surface = build(OffSurface, figure.surface, f"{where}: surface")
-    limits = figure.surface.doubled_m
-    if len(limits) != 2 or not 0 <= limits[0] < limits[1]:
-        raise ConfigError(f"{where}: surface: doubled_m is {limits}; it has to be two distances, least first")
-    if figure.surface.cell_m <= 0 or figure.surface.cell_points < 2:
-        raise ConfigError(f"{where}: surface: cells have to have a size and two points or more")
-    return figure
-
-
-def _check_runs(study: RepeatedRuns, where: str) -> None:
-    """Checks what all experiments with repeated runs share."""
-    for key in ("compared", "baselines"):
-        if unknown := set(getattr(study, key)) - set(study.columns):
-            raise ConfigError(f"{where}: {key}: no column {sorted(unknown)}")
-    for key in ("runs", "first_frames"):
-        if getattr(study, key) < 1:
-            raise ConfigError(f"{where}: {key} is {getattr(study, key)}; it has to be positive")
-    if any(study.change(sequence, study.undisturbed) for sequence in study.sequences):
-        raise ConfigError(f"{where}: conditions: the first one must change nothing")
-
-
-def build_odometry(node: dict[str, Any], where: str) -> Odometry:
-    study = build_on_sequences(Odometry, node, where)
-    _check_runs(study, where)
-    return study
-
-
-def build_trajectory_table(node: dict[str, Any], where: str) -> TrajectoryTable:
-    study = build_on_sequences(TrajectoryTable, node, where, TableSequence)
-    study.programs = build_each(TrackingProgram, study.programs, f"{where}: programs")
-    study.columns = build_each(TrackingColumn, study.columns, f"{where}: columns")
-    study.conditions = build_each(TrackingCondition, study.conditions, f"{where}: conditions")
-    for name, column in study.columns.items():
-        if column.program not in study.programs:
-            raise ConfigError(f"{where}: columns.{name}: no program '{column.program}'")
-    for name, condition in study.conditions.items():
-        if unknown := set(condition.changes) - set(study.sequences):
-            raise ConfigError(f"{where}: conditions.{name}: no sequence {sorted(unknown)}")
-    _check_runs(study, where)
-    return study
-
-
-def _load_table(name: str, where: str, **instead: Any) -> TrajectoryTable:
-    """Reads the trajectory table of paper/experiments/<name>.yaml. @param instead of what is there."""
-    path = paths.EXPERIMENTS / f"{name}.yaml"
-    node = read_yaml(path)
-    if node.get("kind") != "trajectory_table":
-        raise ConfigError(f"{where}: {name} is no trajectory_table")
-    return build_trajectory_table({**node, **instead}, str(path))
-
-
-def build_joined_table(node: dict[str, Any], where: str) -> JoinedTable:
-    joined = build(JoinedTable, node, where)
-    joined.parts = {prefix: _load_table(name, f"{where}: parts") for prefix, name in joined.parts.items()}
-    for part in joined.parts.values():
-        for key in ("lost_below_pct", "fail_above_pct", "published"):
-            if getattr(part, key) != getattr(joined.rule, key):
-                names = f"{part.name} differs from that of {joined.rule.name}"
-                raise ConfigError(f"{where}: parts: {key} of {names}")
-    if unknown := set(joined.published) - set(load_published_rows(joined.rule)):
-        raise ConfigError(f"{where}: published: the paper has no row {sorted(unknown)}")
-    return joined
-
-
-def _check_tuning(tuning: TrackingTuning, where: str) -> None:
-    table = tuning.table
-    if len(tuning.folds) != 2 or sorted(sum(tuning.folds, [])) != sorted(table.sequences):
-        raise ConfigError(f"{where}: folds: each sequence of {table.name} has to be in one of two folds")
-    if not all(tuning.rendered(fold) for fold in (0, 1)):
-        raise ConfigError(f"{where}: folds: each needs a rendered sequence")
-    for key, known in (("conditions", table.conditions), ("columns", table.columns)):
-        if unknown := set(getattr(tuning, key)) - set(known):
-            raise ConfigError(f"{where}: {key}: {table.name} has no {sorted(unknown)}")
-    for name, span in tuning.space.items():
-        if not span.low < span.high or (span.log and span.low <= 0):
-            raise ConfigError(f"{where}: space.{name}: no range from {span.low} to {span.high}")
-    for name, count in asdict(tuning.budget).items():
-        if count < 1:
-            raise ConfigError(f"{where}: budget: {name} is {count}; it has to be positive")
-
-
 def build_tuning(node: dict[str, Any], where: str) -> TrackingTuning:
+    """Makes a tuning of a YAML map, with the keys of the one that it is like."""
     if "like" in node:
         node = {**read_yaml(paths.EXPERIMENTS / f"{node['like']}.yaml"), "by_name_only": False, **node}
-    tuning = build(TrackingTuning, node, where)
-    tuning.table = _load_table(tuning.table, f"{where}: table", tuned=False)
-    tuning.space = build_each(SearchRange, tuning.space, f"{where}: space")
-    tuning.budget = build(TuningBudget, tuning.budget, f"{where}: budget")
-    _check_tuning(tuning, where)
-    tuning.columns = tuning.columns or list(tuning.table.columns)
-    return tuning
+    return build(TrackingTuning, node, where)
 
 
 def load_tuned(column: str, program: str, sequence: str) -> dict[str, Any]:
@@ -504,11 +485,7 @@ def load_external_system(folder: Path) -> ExternalSystem:
     path = folder / "align.yaml"
     if not path.exists():
         return ExternalSystem()
-    system = build(ExternalSystem, read_yaml(path), str(path))
-    for key, known in {"frame": ("body", "camera"), "align": ("se3", "sim3")}.items():
-        if getattr(system, key) not in known:
-            raise ConfigError(f"{path}: {key} is {getattr(system, key)!r}; known: {', '.join(known)}")
-    return system
+    return build(ExternalSystem, read_yaml(path), str(path))
 
 
 def image_times_ns(sequence: Path) -> list[int]:

@@ -280,8 +280,10 @@ def test_published_rows_say_of_bad_pixels_in_mesh_stereo_that_the_original_has_f
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"checks": [{"kind": "guess"}]}, "claims.c: checks: kind is 'guess'; known: ordering, paired"),
-        ({"checks": [{"kind": "value", "table": "t"}]}, "claims.c: checks: key 'quantity' is missing"),
+        ({"checks": [{"kind": "guess"}]}, r"claims\[0\].checks\[0\]: kind is 'guess'; known: ordering, paired"),
+        ({"checks": [{"kind": "value", "table": "t"}]}, r"claims\[0\].checks\[0\]: key 'quantity' is missing"),
+        ({"published": [{"kind": ["value"]}]}, r"claims\[0\].published\[0\].kind: expected str, found \['value'\]"),
+        ({"checks": ["value"]}, r"claims\[0\].checks\[0\]: expected a map, found 'value'"),
         ({"colour": "red"}, "unknown key 'colour'"),
     ],
 )

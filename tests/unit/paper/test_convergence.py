@@ -67,6 +67,7 @@ def test_tracks_are_of_the_first_image_set_at_hand(study, tmp_path):
     [
         ({"drawn": ["photo", "sbd"]}, r"drawn: no column \['sbd'\]"),
         ({"image_sets": NODE["image_sets"][:1]}, "the last one must need no data set"),
+        ({"image_sets": []}, "the last one must need no data set"),
         ({"columns": {"photo": {"metric": "photo"}}}, "columns.photo: unknown key 'metric'"),
     ],
 )

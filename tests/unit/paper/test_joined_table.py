@@ -23,7 +23,9 @@ def joined():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"parts": {"a": "odometry"}}, "parts: odometry is no trajectory_table"),
+        ({"parts": {"a": "odometry"}}, "parts.a: odometry is no trajectory_table"),
+        ({"parts": {"a": ["table3_dso"]}}, "parts.a: expected str, found"),
+        ({"parts": {}}, "parts: there are none"),
         ({"published": ["okvis", "vins"]}, r"published: the paper has no row \['vins'\]"),
         ({"parts": {"a": "gone"}}, "gone.yaml: cannot be read"),
     ],

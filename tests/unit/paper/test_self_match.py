@@ -152,7 +152,7 @@ def test_columns_are_the_papers_in_its_order():
         ({"figure_columns": ["sgf", "sdf"]}, r"figure_columns: no column \['sdf'\]"),
         ({"published_group": "nobody"}, r"no group \['nobody'\]"),
         ({"columns": {"sgf": {"metrics": "sgf"}}}, "columns.sgf: unknown key 'metrics'"),
-        ({"groups": [{"name": "a", "title": "A"}]}, "groups: key 'frames' is missing"),
+        ({"groups": [{"name": "a", "title": "A"}]}, r"groups\[0\]: key 'frames' is missing"),
     ],
 )
 def test_mistakes_are_named(experiments, changes, message):

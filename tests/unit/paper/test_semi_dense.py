@@ -191,5 +191,5 @@ def test_a_bound_that_is_missing_is_named(experiments):
 def test_rows_that_lead_nowhere_are_named(experiments, key, value):
     rows = [{**FIGURE["rows"][0], key: value}]
     (experiments / "bad.yaml").write_text(yaml.safe_dump({**FIGURE, "rows": rows}))
-    with pytest.raises(ConfigError, match=f"bad.yaml: rows: .*{key}"):
+    with pytest.raises(ConfigError, match=rf"bad.yaml: rows\[0\]: .*{key}"):
         config.load_experiment("bad")

@@ -114,6 +114,9 @@ def error_of(options):
         ({"space": {"a": {"low": 2, "high": 1}}}, "space.a: no range from 2 to 1"),
         ({"space": {"a": {"low": 0, "high": 1, "log": True}}}, "space.a: no range from 0 to 1"),
         ({"budget": {**NODE["budget"], "trials": 0}}, "budget: trials is 0; it has to be positive"),
+        ({"space": {"a": {"low": "1e-3", "high": 1}}}, "space.a.low: expected float, found '1e-3'"),
+        ({"table": 3}, "table: expected str, found 3"),
+        ({"table": "tune"}, "table: tune is no trajectory_table"),
     ],
 )
 def test_mistakes_are_named(write, change, message):
