@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Union
 
 from sgf_paper import paths
+from sgf_paper.experiment import Experiment
 from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
 
@@ -50,12 +51,9 @@ class ReportPairs:
 
 
 @dataclass
-class Report:
+class Report(Experiment):
     """What the report shows, and what counts as decided."""
 
-    kind: str
-    name: str
-    title: str
     datasets: dict[str, str]  # what each is
     verdict_clusters: int  # fewer independent pairs give no verdict
     margin_pct: float  # ratios nearer to 1 are equal

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from sgf_paper import cluster, config, file_lock, paths, summary
-from sgf_paper.config import Experiment
+from sgf_paper.experiment import Experiment
 from sgf_paper.progress import clock
 from sgf_paper.stereo_datasets import Dataset, dataset_flags, read_datasets
 from sgf_paper.strict_yaml import ConfigError
@@ -113,27 +113,11 @@ def find_datasets(settings: Settings) -> dict[str, Dataset]:
     return read_datasets(listing)
 
 
-def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
-    """Whether any data set that a stage can use is at hand."""
-    if stage.kind in ("table", "light_change"):
-        return bool(stage.present(datasets))
-    if stage.kind == "density":
-        return any(config.load_experiment(table).present(datasets) for table in stage.tables)
-    if stage.kind == "disparity_figure":
-        return stage.group(datasets) is not None
-    if stage.kind in (
-        "contact_sheet", "convergence", "direct_map", "joined_table", "mrpt_map", "odometry", "self_match",
-        "report", "semi_dense", "sequences", "shift_profile", "trajectory_table", "tuning",
-    ):  # fmt: skip
-        return True  # rendered
-    return stage.pair(datasets) is not None
-
-
 def obstacle(stage: Experiment, datasets: dict[str, Dataset], programs: Path) -> str:
     """Why a stage cannot be made; empty if it can be."""
     if stage.kind == "mrpt_map" and not (programs / "sgf-odometry-cli").exists():
         return "the MRPT module is not part of the build"
-    return "" if has_data(stage, datasets) else "its data are not at hand"
+    return "" if stage.has_data(datasets) else "its data are not at hand"
 
 
 def _where(settings: Settings) -> list[str]:

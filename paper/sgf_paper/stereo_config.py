@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from sgf_paper import paths
+from sgf_paper.experiment import Experiment
 from sgf_paper.stereo_datasets import Dataset
 from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
@@ -108,10 +109,7 @@ class TableBlock:
 
 
 @dataclass
-class Table:
-    kind: str
-    name: str
-    title: str
+class Table(Experiment):
     datasets: list[str]
     published: str
     published_dataset: str
@@ -135,6 +133,9 @@ class Table:
                 return block
         raise ConfigError(f"table {self.name} has no block of sweep {sweep}")
 
+    def has_data(self, datasets: dict[str, Dataset]) -> bool:
+        return bool(self.present(datasets))
+
     def present(self, datasets: dict[str, Dataset]) -> list[str]:
         """Names of the data sets to run among those that were found."""
         return [name for name in self.datasets if name in datasets]
@@ -151,22 +152,19 @@ def load_table(name: str) -> Table:
 
 
 @dataclass
-class Density:
-    kind: str
-    name: str
-    title: str
+class Density(Experiment):
     tables: list[str]
     quantities: list[str]
     kept_pct: list[float]
 
+    def has_data(self, datasets: dict[str, Dataset]) -> bool:
+        return any(load_table(table).has_data(datasets) for table in self.tables)
+
 
 @dataclass
-class LightChange:
+class LightChange(Experiment):
     """What changes between the images of a pair, and on which columns its effect is measured."""
 
-    kind: str
-    name: str
-    title: str
     table: str  # has the sweeps and the fixed parameters
     datasets: list[str]
     columns: list[str]
@@ -177,6 +175,9 @@ class LightChange:
         for sweep in load_table(self.table).sweeps:
             if unknown := set(self.columns) - set(sweep.columns):
                 raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep.name}")
+
+    def has_data(self, datasets: dict[str, Dataset]) -> bool:
+        return bool(self.present(datasets))
 
     def present(self, datasets: dict[str, Dataset]) -> list[str]:
         """Names of the data sets to run among those that were found."""
@@ -203,10 +204,7 @@ class SceneGroup:
 
 
 @dataclass
-class DisparityFigure:
-    kind: str
-    name: str
-    title: str
+class DisparityFigure(Experiment):
     sweeps: list[str]
     parameters_of: str
     columns: list[str]
@@ -216,6 +214,9 @@ class DisparityFigure:
         for sweep in self.sweeps:
             if unknown := set(self.columns) - set(load_sweep(sweep).columns):
                 raise ConfigError(f"{where}: no column {sorted(unknown)} in sweep {sweep}")
+
+    def has_data(self, datasets: dict[str, Dataset]) -> bool:
+        return self.group(datasets) is not None
 
     def group(self, datasets: dict[str, Dataset]) -> SceneGroup | None:
         """First group with a scene whose left image exists, cut down to such scenes."""
@@ -230,14 +231,14 @@ class DisparityFigure:
 
 
 @dataclass
-class Benchmark:
-    kind: str
-    name: str
-    title: str
+class Benchmark(Experiment):
     dataset: str
     scene: str
     repetitions: int
     min_time_s: float  # of one repetition
+
+    def has_data(self, datasets: dict[str, Dataset]) -> bool:
+        return self.pair(datasets) is not None
 
     def pair(self, datasets: dict[str, Dataset]) -> Path | None:
         """Folder of the pair that is matched, None if it is not at hand."""

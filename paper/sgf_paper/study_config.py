@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sgf_paper import paths
+from sgf_paper.experiment import Experiment
 from sgf_paper.published_values import published_entry
 from sgf_paper.stereo_datasets import Dataset
 from sgf_paper.strict_yaml import ConfigError
@@ -29,12 +30,9 @@ class SemiDenseColumn:
 
 
 @dataclass
-class SemiDense:
+class SemiDense(Experiment):
     """What `sgf_study semi-dense` runs and how its points are drawn."""
 
-    kind: str
-    name: str
-    title: str
     pair: str  # below the folder of generated data sets
     study: dict[str, Any]
     cases: dict[str, Any]
@@ -94,12 +92,9 @@ class SelfMatchColumn:
 
 
 @dataclass
-class SelfMatch:
+class SelfMatch(Experiment):
     """What `sgf_study self-match` runs on each frame and how it is shown."""
 
-    kind: str
-    name: str
-    title: str
     groups: list[FrameGroup]
     published: str
     published_group: str
@@ -163,12 +158,9 @@ class ConvergenceColumn:
 
 
 @dataclass
-class Convergence:
+class Convergence(Experiment):
     """What `sgf_study convergence` runs and how it is shown."""
 
-    kind: str
-    name: str
-    title: str
     image_sets: list[ImageSet]
     study: dict[str, Any]
     drawn: list[str]
@@ -191,32 +183,23 @@ class Convergence:
 
 
 @dataclass
-class ShiftProfile:
+class ShiftProfile(Experiment):
     """What `sgf_study shift-profile` runs."""
 
-    kind: str
-    name: str
-    title: str
     study: dict[str, Any]
 
 
 @dataclass
-class ContactSheet:
+class ContactSheet(Experiment):
     """Views of the synthetic scenes."""
 
-    kind: str
-    name: str
-    title: str
     scenes: dict[str, list[str]]  # names of views
 
 
 @dataclass
-class Sequences:
+class Sequences(Experiment):
     """Stereo-inertial sequences: recipes of datasets/synthetic."""
 
-    kind: str
-    name: str
-    title: str
     short: list[str]
     full: list[str]
 

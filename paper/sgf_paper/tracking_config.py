@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from sgf_paper import paths
+from sgf_paper.experiment import Experiment
 from sgf_paper.published_values import published_entry
 from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
@@ -40,12 +41,9 @@ class TrackedSequence:
 
 
 @dataclass
-class SequenceExperiment:
+class SequenceExperiment(Experiment):
     """What is run on sequences."""
 
-    kind: str
-    name: str
-    title: str
     sequences: dict[str, TrackedSequence]
 
     def present(self, data: str) -> list[str]:
@@ -324,12 +322,9 @@ class ExternalSystem:
 
 
 @dataclass
-class JoinedTable:
+class JoinedTable(Experiment):
     """Trajectory tables side by side, with the paper's rows and the trajectories of other systems."""
 
-    kind: str
-    name: str
-    title: str
     parts: dict[str, Annotated[TrajectoryTable, _load_table]]  # by what systems' names begin with; by name in the file
     published: list[str]  # rows of the paper's table that are systems of their own
 
@@ -385,12 +380,9 @@ class TuningBudget:
 
 
 @dataclass
-class TrackingTuning:
+class TrackingTuning(Experiment):
     """What options of a trajectory table's programs are looked for, and on which sequences."""
 
-    kind: str
-    name: str
-    title: str
     table: Annotated[TrajectoryTable, partial(_load_table, tuned=False)]  # by name in the file; columns' own options
     folder: str  # of what is found, below the results
     folds: list[list[str]]  # all sequences of the table; those rendered are tuned on

@@ -1,9 +1,12 @@
 """Reading of experiments: what is in the project is sound, and mistakes are named."""
 
+from pathlib import Path
+
 import pytest
 import yaml
 
-from sgf_paper import config, paths
+from sgf_paper import config, paths, run, summary
+from sgf_paper.experiment import Experiment
 from sgf_paper.stereo_config import load_published
 from sgf_paper.stereo_datasets import Dataset, read_datasets
 from sgf_paper.strict_yaml import ConfigError, read_yaml
@@ -15,6 +18,37 @@ TABLE1 = yaml.safe_load((paths.EXPERIMENTS / "table1.yaml").read_text())
 @pytest.mark.parametrize("name", NAMES)
 def test_every_experiment_is_read_and_named_after_its_file(name):
     assert config.load_experiment(name).name == name
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_an_experiment_is_made_when_a_file_that_it_makes_is_there(name):
+    stage = config.load_experiment(name)
+    kind = config.KINDS[stage.kind]
+    main = str(summary.main_file(stage, Path()))
+    assert main in kind.files(name) or main in kind.others.format(name=name, folder="").split(", ")
+
+
+def test_a_new_kind_is_one_line_for_loader_run_and_summary(experiments, monkeypatch):
+    monkeypatch.setitem(config.KINDS, "toy", config.Kind(Experiment, (".csv", "_more.csv", ".md"), (".png", ".pdf")))
+    (experiments / "new.yaml").write_text("{kind: toy, name: new, title: A toy}")
+    stage = config.load_experiment("new")
+    assert run.obstacle(stage, {}, experiments) == ""
+    assert summary.stage_lines(stage, experiments, 0) == ["  new            NOT MADE"]
+    (experiments / "tables").mkdir()
+    (experiments / "tables" / "new.csv").touch()
+    said = "figures/new.png (.pdf), tables/new.md (.csv, _more.csv)"
+    assert summary.stage_lines(stage, experiments, 0) == [f"  new            made        {said}"]
+
+
+@pytest.mark.parametrize("name", ["table1", "density", "fig4", "light_change", "bench_stereo"])
+def test_what_is_not_rendered_needs_a_data_set(name, tmp_path):
+    stage = config.load_experiment(name)
+    assert run.obstacle(stage, {}, tmp_path) == "its data are not at hand"
+    pair = tmp_path / "Motorcycle"
+    pair.mkdir()
+    (pair / "im0.png").touch()
+    datasets = {"debian_pairs": Dataset("debian_pairs", tmp_path, 1)}
+    assert run.obstacle(stage, datasets, tmp_path) == ""
 
 
 def test_columns_of_the_paper_come_first_and_in_its_order():
