@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Iterator
 
-from sgf_paper import config
-from sgf_paper.strict_yaml import ConfigError, build_each, build_typed, read_yaml, require
+from sgf_paper import paths
+from sgf_paper.strict_yaml import ConfigError, build, read_yaml
 
-CATALOG = config.PROJECT / "datasets" / "catalog.yaml"
+CATALOG = paths.PROJECT / "datasets" / "catalog.yaml"
 LARGEST_SIZE = 10**15  # bytes
 LONGEST_NAME = 200  # bytes; file systems take 255, and names get longer while their files are made
 ARCHIVE_NAMES = (".zip", ".tar", ".tar.gz", ".tgz")
@@ -124,20 +124,16 @@ def _check_archive(name: str, archive: Archive, where: str) -> None:
 
 def _load_source(label: str, node: Any, publishers: dict[str, Publisher], where: str) -> Source:
     _require_plain(label, where)
-    require(dict[str, Any], node, where)
-    name = node.get("publisher")
+    name = build(dict[str, Any], node, where).get("publisher")
     if not isinstance(name, str) or name not in publishers:
         raise ConfigError(f"{where}: publisher is {reprlib.repr(name)}; known: {', '.join(publishers)}")
-    ways = node.get("ways", [])
-    require(list[list[Any]], ways, f"{where}.ways")
-    ways = [[build_typed(Piece, piece, f"{where}.ways") for piece in way] for way in ways]
-    source = build_typed(Source, {**node, "publisher": publishers[name], "ways": ways}, where)
+    source = build(Source, {**node, "publisher": publishers[name]}, where)
     _require_sizes([source.unpacked_bytes], where)
-    for path in [source.folder, *source.holds, *(piece.to for way in ways for piece in way)]:
+    for path in [source.folder, *source.holds, *(piece.to for way in source.ways for piece in way)]:
         _require_relative(path, where)
     if str(Path(source.folder)).startswith("."):  # the data folder itself, or hidden, as fetch's own are
         raise ConfigError(f"{where}: folder {source.folder!r} is not a plain one below the data folder")
-    if not all(ways):
+    if not all(source.ways):
         raise ConfigError(f"{where}.ways: one has no pieces")
     if not source.ways and not source.by_hand:
         raise ConfigError(f"{where}: has neither ways nor by_hand")
@@ -170,17 +166,16 @@ def load_catalog(path: Path = CATALOG) -> Catalog:
     if set(node) != {"archives", "publishers", "datasets", "groups"}:
         found = ", ".join(map(str, node))
         raise ConfigError(f"{path}: expected archives, publishers, datasets and groups, found {found}")
-    require(dict[str, list[str]], node["groups"], f"{path}: groups")
-    archives = build_each(Archive, node["archives"], f"{path}: archives", build_typed)
+    groups = build(dict[str, list[str]], node["groups"], f"{path}: groups")
+    archives = build(dict[str, Archive], node["archives"], f"{path}: archives")
     for name, archive in archives.items():
         _check_archive(name, archive, f"{path}: archives.{name}")
-    publishers = build_each(Publisher, node["publishers"], f"{path}: publishers", build_typed)
-    require(dict[str, Any], node["datasets"], f"{path}: datasets")
+    publishers = build(dict[str, Publisher], node["publishers"], f"{path}: publishers")
     datasets = {
         name: _load_source(name, source, publishers, f"{path}: datasets.{name}")
-        for name, source in node["datasets"].items()
+        for name, source in build(dict[str, Any], node["datasets"], f"{path}: datasets").items()
     }
-    catalog = Catalog(archives, datasets, node["groups"])
+    catalog = Catalog(archives, datasets, groups)
     _check_names(catalog, path)
     return catalog
 
@@ -198,12 +193,12 @@ def _texts(node: Any) -> Iterator[str]:
 
 def needed_by(experiments: list[str], catalog: Catalog) -> list[str]:
     """Data sets for fetch that experiments, and those that they refer to, name or whose files they name."""
-    known = {file.stem for file in config.EXPERIMENTS.glob("*.yaml")}
+    known = {file.stem for file in paths.EXPERIMENTS.glob("*.yaml")}
     waiting, seen, words = list(experiments), set(), set()
     while waiting:
         name = waiting.pop()
         seen.add(name)
-        texts = set(_texts(read_yaml(config.EXPERIMENTS / f"{name}.yaml")))
+        texts = set(_texts(read_yaml(paths.EXPERIMENTS / f"{name}.yaml")))
         words |= texts
         waiting += texts & known - seen
     return [

@@ -14,8 +14,8 @@ from typing import Any
 import pandas as pd
 
 from sgf_paper import pairs
-from sgf_paper.config import Check, Claim, Interval, Ordering, Paired, Value
 from sgf_paper.pairs import Rule
+from sgf_paper.report_config import Check, Claim, Interval, Ordering, Paired, Value
 
 FIRST_LINE = 2  # of a CSV file, after its header
 HOLDS, FAILS, OPEN, FEW, MISSING = "holds", "does not hold", "undecided", "too few", "not measured"

@@ -8,8 +8,12 @@ from typing import Any
 
 import pandas as pd
 
-from sgf_paper import config
-from sgf_paper.config import Comparison, ConfigError, JoinedTable, SelfMatch, Table, Tolerance
+from sgf_paper import config, paths
+from sgf_paper.published_values import Comparison, Tolerance, load_comparisons
+from sgf_paper.stereo_config import Table, load_published
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.study_config import SelfMatch, load_published_errors
+from sgf_paper.tracking_config import JoinedTable, load_published_rows
 
 PASS, NEAR, FAIL, NO_MARK = "pass", "near", "fail", "–"
 KEYS = ["table", "part", "row", "column", "quantity"]
@@ -43,7 +47,7 @@ def _stereo_values(table: Table, lines: pd.DataFrame | None) -> Iterator[Value]:
     own = None if lines is None else lines[(lines["dataset"] == table.published_dataset) & (lines["scenes"] > 0)]
     regions = ["region not stated"] if own is None or own.empty else list(own["region"].unique())
     for block in table.blocks:
-        for quantity, values in config.load_published(table, block.published).items():
+        for quantity, values in load_published(table, block.published).items():
             for cost, published in values.items():
                 for region in regions:
                     yield _stereo_value(table, block.sweep.matcher, cost, quantity, region, published, own)
@@ -67,7 +71,7 @@ def _joined_values(joined: JoinedTable, lines: pd.DataFrame | None) -> Iterator[
     systems = {column.published: f"{prefix}_{name}" for prefix, part in joined.parts.items()
                for name, column in part.columns.items() if column.published}  # fmt: skip
     labels = {sequence.published: sequence.euroc_name for sequence in joined.sequences if sequence.published}
-    for row, values in config.load_published_rows(joined.rule).items():
+    for row, values in load_published_rows(joined.rule).items():
         system, measured = _measured_errors(lines, [systems.get(row, row), row])
         of_labels = measured.reindex([labels.get(label) for label in values if label != "avg"])
         of_labels.index = [label for label in values if label != "avg"]
@@ -104,7 +108,7 @@ def _self_match_values(figure: SelfMatch, lines: pd.DataFrame | None) -> Iterato
     """Of Figure 1."""
     group = next(group for group in figure.groups if group.name == figure.published_group)
     why = f"{figure.name} was not made" if lines is None else f"{group.title}: not at hand"
-    for cost, values in config.load_published_errors(figure).items():
+    for cost, values in load_published_errors(figure).items():
         for frame, published in zip(group.frames, values):
             measured = _measured_frame(figure, lines, frame, cost)
             size = int(measured == measured)
@@ -160,10 +164,10 @@ def _allowed(tolerance: Tolerance, name: str, published: float) -> float:
 def compare(tables: Tables) -> pd.DataFrame:
     """A line for each value of the paper, with its mark or the reason why there is none."""
     lines: list[dict[str, Any]] = []
-    for entry, comparison in config.load_comparisons().items():
+    for entry, comparison in load_comparisons().items():
         experiment = config.load_experiment(comparison.experiment)
         for value in READERS[experiment.kind](experiment, tables(experiment.name)):
-            tolerance = find_tolerance(comparison, value, f"{config.PUBLISHED}: comparison.{entry}")
+            tolerance = find_tolerance(comparison, value, f"{paths.PUBLISHED}: comparison.{entry}")
             word, reason = mark(comparison, value, tolerance)
             lines.append({
                 "table": experiment.name, "part": value.part, "row": value.row, "column": value.column,
@@ -183,7 +187,7 @@ def published_rows(entry: str) -> pd.DataFrame | None:
     """
     if entry == "averages":
         return averages()
-    comparisons = config.load_comparisons()
+    comparisons = load_comparisons()
     if entry not in comparisons:
         return None
     experiment = config.load_experiment(comparisons[entry].experiment)

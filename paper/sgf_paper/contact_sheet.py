@@ -9,10 +9,11 @@ import numpy as np
 from PIL import Image
 
 from sgf_paper import config
+from sgf_paper.study_config import ContactSheet
 from sgf_paper.style import plt, save
 
 
-def draw(sheet: config.ContactSheet, pairs: Path) -> plt.Figure:
+def draw(sheet: ContactSheet, pairs: Path) -> plt.Figure:
     columns = max(len(names) for names in sheet.scenes.values())
     figure, axes = plt.subplots(
         len(sheet.scenes), columns, figsize=(2.2 * columns, 1.5 * len(sheet.scenes)), squeeze=False

@@ -8,7 +8,8 @@ from pathlib import Path
 import pandas as pd
 
 from sgf_paper import config, style, text
-from sgf_paper.config import Convergence, ImageSet
+from sgf_paper.stereo_datasets import read_datasets
+from sgf_paper.study_config import Convergence, ImageSet
 from sgf_paper.style import plt
 
 WIDTH = 10.0  # of the figure, inches
@@ -103,7 +104,7 @@ def make_blocks(study: Convergence, table: pd.DataFrame) -> list[dict]:
 def make_figure(name: str, raw: Path, datasets: Path, tables: Path, figures: Path) -> None:
     """Makes the table and the figure."""
     study = config.load_experiment(name)
-    images = study.images(config.read_datasets(datasets))
+    images = study.images(read_datasets(datasets))
     table = pd.read_csv(raw)
     text.write_csv(table, tables / f"{name}.csv")
     document = text.render(

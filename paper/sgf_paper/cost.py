@@ -11,7 +11,7 @@ from collections import defaultdict
 from pathlib import Path
 from statistics import mean
 
-from sgf_paper import config
+from sgf_paper import paths
 
 HEADER = "| rule | runs | CPU s, mean | CPU s, most | CPU h, all | peak MiB |\n|---|---|---|---|---|---|\n"
 
@@ -37,7 +37,7 @@ def cost_table(results: Path) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="sgf_paper.cost", description=__doc__)
-    parser.add_argument("--results", type=Path, default=config.PROJECT / "results")
+    parser.add_argument("--results", type=Path, default=paths.PROJECT / "results")
     print(cost_table(parser.parse_args().results), end="")
 
 

@@ -15,7 +15,8 @@ import matplotlib.pyplot as plt
 import pandas as pd
 
 from sgf_paper import config, scores, style, text
-from sgf_paper.config import Density, TableBlock
+from sgf_paper.stereo_config import Density, Table, TableBlock
+from sgf_paper.stereo_datasets import read_datasets
 
 KEYS = ["dataset", "region", "matcher", "cost", "window"]
 CURVE_COLUMNS = [*KEYS, "uniqueness", "kept_pct", *scores.ERRORS, "scenes"]
@@ -52,7 +53,7 @@ def _panel(block: TableBlock, dataset: str, region: str, lines: pd.DataFrame) ->
     }
 
 
-def _dataset_rows(table: config.Table, dataset: str, raw: Path) -> Rows:
+def _dataset_rows(table: Table, dataset: str, raw: Path) -> Rows:
     """A row for each region, in it the table's matchers."""
     rows: dict[str, dict[Panel, Curves]] = {}
     for block in table.curve_blocks:
@@ -63,7 +64,7 @@ def _dataset_rows(table: config.Table, dataset: str, raw: Path) -> Rows:
     return list(rows.values())
 
 
-def make_curves(density: Density, tables: dict[str, config.Table], raw: Path, datasets: dict) -> Rows:
+def make_curves(density: Density, tables: dict[str, Table], raw: Path, datasets: dict) -> Rows:
     """Density curves of every column, by data set, region, matcher and window."""
     return [
         row
@@ -104,7 +105,7 @@ def equal_table(rows: Rows, shares: list[float]) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=EQUAL_COLUMNS)
 
 
-def _extra_columns(tables: dict[str, config.Table]) -> list[str]:
+def _extra_columns(tables: dict[str, Table]) -> list[str]:
     """Columns beyond the paper's of all blocks, each once."""
     blocks = [block for table in tables.values() for block in table.curve_blocks]
     names = [name for b in blocks for name in b.sweep.sparse_columns if b.sweep.columns[name].extra]
@@ -175,7 +176,7 @@ def make_density(name: str, raw: Path, listing: Path, tables_out: Path, figures_
     """Makes density.csv, density_equal.csv, density.md and the figure."""
     density = config.load_experiment(name)
     tables = {table: config.load_experiment(table) for table in density.tables}
-    rows = make_curves(density, tables, raw, config.read_datasets(listing))
+    rows = make_curves(density, tables, raw, read_datasets(listing))
     equal = equal_table(rows, density.kept_pct)
     text.write_csv(curve_table(rows), tables_out / f"{name}.csv")
     text.write_csv(equal, tables_out / f"{name}_equal.csv")

@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from sgf_paper import config
-from sgf_paper.config import ConfigError
+from sgf_paper import paths
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
 ALL = "all"
 ROW = re.compile(r'^\| <a id="([a-z0-9-]+)"></a>(.*) \|$')
@@ -31,7 +31,7 @@ class Chapter:
     entries: list[Entry]
 
 
-def read_chapters(document: Path = config.DEVIATIONS_TEXT) -> list[Chapter]:
+def read_chapters(document: Path = paths.DEVIATIONS_TEXT) -> list[Chapter]:
     """The tables of the document.
 
     Raises ConfigError for a line without an anchor or with other than four cells, and for an anchor that is there
@@ -53,9 +53,9 @@ def read_chapters(document: Path = config.DEVIATIONS_TEXT) -> list[Chapter]:
     return [chapter for chapter in chapters if chapter.entries]
 
 
-def load_deviations(file: Path = config.DEVIATIONS, document: Path = config.DEVIATIONS_TEXT) -> Notes:
+def load_deviations(file: Path = paths.DEVIATIONS, document: Path = paths.DEVIATIONS_TEXT) -> Notes:
     """What rows refer to. Raises ConfigError for a key that is no entry's."""
-    groups = config.read_yaml(file)
+    groups = read_yaml(file)
     entries = [entry for chapter in read_chapters(document) for entry in chapter.entries]
     numbers = {entry.key: number for number, entry in enumerate(entries, 1)}
     for group, rows in groups.items():

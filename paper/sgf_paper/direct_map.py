@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, map_view, style, text
-from sgf_paper.config import DirectMap, MapPoints, OffSurface
 from sgf_paper.map_view import AXES, Folders, Map, Panel, Row
 from sgf_paper.semi_dense_figure import read_ply
 from sgf_paper.style import plt
+from sgf_paper.tracking_config import DirectMap, MapPoints, OffSurface
 
 WIDTH = 12.0  # of the figure, inches
 SPREAD_PCT = [10, 90]  # of the offsets in a cell; a spread is what lies between

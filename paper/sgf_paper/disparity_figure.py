@@ -14,7 +14,8 @@ import numpy as np
 import yaml
 
 from sgf_paper import config, images, style, text
-from sgf_paper.config import DisparityFigure, FigureScene, Parameters, Sweep, TableBlock
+from sgf_paper.stereo_config import DisparityFigure, FigureScene, Parameters, Sweep, TableBlock
+from sgf_paper.stereo_datasets import read_datasets
 
 WIDTH = 10.0  # of a figure, inches
 WIDE = 2.5  # aspect from which image and truth stand above the maps instead of beside them
@@ -150,7 +151,7 @@ def draw(scenes: list[Scene], columns: list[str]) -> plt.Figure:
 def make_figure(name: str, listing: Path, program: Path, work: Path, out: Path) -> None:
     """Matches the scenes at hand and draws figure `name`."""
     figure = config.load_experiment(name)
-    datasets = config.read_datasets(listing)
+    datasets = read_datasets(listing)
     group = figure.group(datasets)
     folder = datasets[group.dataset].folder
     scenes = [load_scene(figure, folder, scene, program, work / name) for scene in group.scenes]

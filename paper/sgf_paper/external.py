@@ -16,7 +16,8 @@ from pathlib import Path
 import pandas as pd
 
 from sgf_paper import config, odometry_scores
-from sgf_paper.config import JoinedTable, TableSequence
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.tracking_config import JoinedTable, TableSequence, image_times_ns, load_external_system
 
 SUFFIXES = (".txt", ".csv")
 NS = 10**9
@@ -156,7 +157,7 @@ class Scorer:
         """The sequence whose images were taken when the poses were, and the poses of that time."""
         spans = []
         for sequence in candidates(self.joined, path.stem, self.data):
-            times = config.image_times_ns(sequence.path(self.suite, self.data))
+            times = image_times_ns(sequence.path(self.suite, self.data))
             first, last = times[0] - TOLERANCE_NS, times[-1] + TOLERANCE_NS
             inside = [pose for pose in poses if first <= pose.time_ns <= last]
             if inside:
@@ -166,7 +167,7 @@ class Scorer:
 
     def score(self, path: Path) -> dict[str, object]:
         """A line of scores of a file."""
-        how = config.load_external_system(path.parent)
+        how = load_external_system(path.parent)
         sequence, poses = self._sequence(path, read_poses(path))
         with tempfile.TemporaryDirectory() as work:
             estimate, out = Path(work) / "estimate.txt", Path(work) / "scores.json"
@@ -198,7 +199,7 @@ def main() -> None:
     try:
         check_names(joined, path, a.files)
         line = Scorer(joined, a.program, a.suite, a.data).score(path)
-    except (ExternalError, odometry_scores.ScoresError, config.ConfigError) as error:
+    except (ExternalError, odometry_scores.ScoresError, ConfigError) as error:
         raise SystemExit(f"Error: {error}") from None
     pd.DataFrame([line]).to_csv(a.out, index=False)
 

@@ -26,8 +26,8 @@ import yaml
 from sgf_paper import catalog as catalogs
 from sgf_paper import config, download, file_lock, unpack
 from sgf_paper.catalog import Archive, Catalog, Piece, Source
-from sgf_paper.config import ConfigError
 from sgf_paper.download import DownloadError, Patience
+from sgf_paper.strict_yaml import ConfigError
 from sgf_paper.unpack import UnpackError
 
 LOCK_WAIT_S = 5  # aria2 notices within a second that who started it was killed

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, style, text, trajectory_table
-from sgf_paper.config import JoinedTable, TableSequence, TrajectoryTable
 from sgf_paper.deviations import load_deviations
 from sgf_paper.style import plt
+from sgf_paper.tracking_config import JoinedTable, TableSequence, TrajectoryTable, load_published_rows
 
 KEYS = ["condition", "dataset", "sequence", "system", "quantity"]
 LINE = [*KEYS, "measured", "published", "runs"]
@@ -128,7 +128,7 @@ def labels_of(joined: JoinedTable) -> dict[str, str]:
 
 def published_lines(joined: JoinedTable, systems: list[System]) -> list[dict]:
     """The paper's values, all of EuRoC's whole sequences."""
-    rows = config.load_published_rows(joined.rule)
+    rows = load_published_rows(joined.rule)
     key = {"condition": UNDISTURBED, "dataset": "euroc", "quantity": PUBLISHED_QUANTITY}
     return [
         {**key, "system": system.name, "sequence": sequence, "published": rows[system.published][label]}
@@ -233,7 +233,7 @@ class Grid:
 
     def __init__(self, joined: JoinedTable, systems: list[System], lines: pd.DataFrame, dataset: str) -> None:
         self.labels = labels_of(joined)
-        self.rows_of_paper = config.load_published_rows(joined.rule)
+        self.rows_of_paper = load_published_rows(joined.rule)
         self.dataset = dataset
         self.condition = lines["condition"].iloc[0]
         own = [system.name for system in systems if system.group in (REBUILT, BEYOND)]

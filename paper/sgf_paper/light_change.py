@@ -15,7 +15,8 @@ import matplotlib.pyplot as plt
 import pandas as pd
 
 from sgf_paper import config, scores, style, text
-from sgf_paper.config import LightChange, TableBlock
+from sgf_paper.stereo_config import LightChange, TableBlock
+from sgf_paper.stereo_datasets import read_datasets
 
 QUANTITIES = ["mean_px", "bad2_pct", "invalid_pct", "within2_pct"]
 KEYS = ["dataset", "region", "case", "matcher", "cost"]
@@ -200,7 +201,7 @@ def draw(experiment: LightChange, table: pd.DataFrame) -> plt.Figure:
 def make_light_change(name: str, raw: Path, listing: Path, tables: Path, figures: Path) -> None:
     """Makes <name>.csv, <name>.md and the figure."""
     experiment = config.load_experiment(name)
-    table = make_table(experiment, raw, experiment.present(config.read_datasets(listing)))
+    table = make_table(experiment, raw, experiment.present(read_datasets(listing)))
     text.write_csv(table, tables / f"{name}.csv")
     document = text.render(
         "light_change.md.j2",

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, map_view, style, text
-from sgf_paper.config import MrptMap
 from sgf_paper.map_view import AXES, Folders, Map, Panel, Row
 from sgf_paper.style import plt
+from sgf_paper.tracking_config import MrptMap
 
 WIDTH = 9.0  # of the figure, inches
 COUNTS = re.compile(r"frames: (\d+), with pose: (\d+), lost: \d+, restarts: \d+, key-frames: (\d+)")

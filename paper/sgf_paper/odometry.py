@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, paired, repeated_runs, style, text
-from sgf_paper.config import Odometry
 from sgf_paper.paired import Estimate
 from sgf_paper.repeated_runs import KEYS
 from sgf_paper.style import plt
+from sgf_paper.tracking_config import Odometry
 
 LINE = [
     *KEYS, "runs", "lost", "posed_pct", "clipped_pct", "ate_mm", "ate_low_mm", "ate_high_mm",

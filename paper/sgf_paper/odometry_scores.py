@@ -18,7 +18,8 @@ from typing import Any
 import pandas as pd
 
 from sgf_paper import config
-from sgf_paper.config import RepeatedRuns
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.tracking_config import RepeatedRuns
 
 # What sgf_eval calls the errors that are kept, at common times and of all poses of a run.
 ERRORS = {
@@ -150,7 +151,7 @@ def main() -> None:
     a = parser.parse_args()
     try:
         table = score(config.load_experiment(a.name), a.sequence, a.folder, a.runs, a.program)
-    except (ScoresError, config.ConfigError) as error:
+    except (ScoresError, ConfigError) as error:
         raise SystemExit(f"Error: {error}") from None
     table.to_csv(a.out, index=False)
 

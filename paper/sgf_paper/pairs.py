@@ -15,7 +15,7 @@ import pandas as pd
 from scipy import stats
 
 from sgf_paper import config, paired
-from sgf_paper.config import ReportPairs
+from sgf_paper.report_config import ReportPairs
 
 ROW = [
     "experiment", "where", "clusters_are", "own", "other", "pairs", "clusters", "own_failed", "other_failed",

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from sgf_paper import text
-from sgf_paper.config import RepeatedRuns
+from sgf_paper.tracking_config import RepeatedRuns
 
 KEYS = ["sequence", "condition", "column"]
 LENGTHS = ["ate", "ate_mean", "rpe_half_second", "rpe_one_second"]

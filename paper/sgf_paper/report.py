@@ -23,13 +23,14 @@ from typing import Any
 import pandas as pd
 from PIL import Image
 
-from sgf_paper import claims, comparison, config, pairs, report_grid, summary, text
+from sgf_paper import claims, comparison, config, pairs, paths, report_grid, summary, text
 from sgf_paper.claims import Finding, Tables
-from sgf_paper.config import Report, ReportItem
 from sgf_paper.deviations import Chapter, Notes, load_deviations, read_chapters
+from sgf_paper.report_config import Report, ReportItem, load_claims
 from sgf_paper.report_grid import Grid, Links, Marks, Page
+from sgf_paper.strict_yaml import ConfigError
 
-MAIN = config.PAPER / "main.tex"
+MAIN = paths.PAPER / "main.tex"
 CHAPTERS = ["claims", "slips", "new"]
 PNG_BYTES = 150_000  # larger figures become WebP
 MOST_RUNS = 4  # that an outcome names; its lines name more
@@ -125,7 +126,7 @@ def title(chapter: str, finding: Finding) -> str:
 def list_parts(results: Path, reasons: dict[str, str], main_file: Callable) -> list[Part]:
     """All experiments but the report itself. @param main_file says where an experiment's main file is."""
     parts, links = [], Links(results)
-    for path in sorted(config.EXPERIMENTS.glob("*.yaml")):
+    for path in sorted(paths.EXPERIMENTS.glob("*.yaml")):
         experiment = config.load_experiment(path.stem)
         if experiment.kind == "report":
             continue
@@ -184,7 +185,7 @@ def compare_methods(report: Report, tables: Tables, links: Links) -> dict[str, p
 def find(report: Report, sources: dict[str, Tables]) -> dict[str, list[Finding]]:
     """All claims with what the sources and the paper's rows say."""
     rule = pairs.Rule(report.verdict_clusters, report.margin_pct)
-    every, published = config.load_claims(), comparison.PublishedRows()
+    every, published = load_claims(), comparison.PublishedRows()
     return {
         chapter: [claims.judge(claim, sources, published, rule) for claim in getattr(every, chapter)]
         for chapter in CHAPTERS
@@ -212,7 +213,7 @@ def gather(name: str, results: Path, reasons: dict[str, str], main_file: Callabl
     notes = load_deviations()
     return Contents(
         report=report,
-        findings=find(report, {claims.THIS_RUN: tables, claims.REFERENCE: Tables(config.REFERENCE)}),
+        findings=find(report, {claims.THIS_RUN: tables, claims.REFERENCE: Tables(paths.REFERENCE)}),
         values=report_grid.link_values(values, links),
         pairs=compare_methods(report, tables, links),
         runs_of=report_grid.RunLinks(report, tables, links),
@@ -347,7 +348,7 @@ def main() -> None:
     arguments = parser.parse_args()
     try:
         make_report(arguments.name, arguments.results, arguments.reasons, summary.main_file)
-    except (ReportError, claims.ClaimError, config.ConfigError) as error:
+    except (ReportError, claims.ClaimError, ConfigError) as error:
         sys.exit(f"Error: {error}")
 
 

@@ -10,9 +10,12 @@ from pathlib import Path
 import pandas as pd
 
 from sgf_paper import claims, comparison, config, joined_table, text
-from sgf_paper.config import JoinedTable, Report, ReportPairs, ReportTable, SelfMatch, Table, TrajectoryTable
 from sgf_paper.deviations import Notes
 from sgf_paper.joined_table import System
+from sgf_paper.report_config import Report, ReportPairs, ReportTable
+from sgf_paper.stereo_config import Table
+from sgf_paper.study_config import SelfMatch
+from sgf_paper.tracking_config import JoinedTable, TrajectoryTable
 
 NO_VALUE = "the table has no value here"
 RECORD = "run.json"

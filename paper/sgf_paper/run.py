@@ -17,14 +17,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
-from sgf_paper import cluster, config, file_lock, summary
-from sgf_paper.config import Dataset, Experiment
+from sgf_paper import cluster, config, file_lock, paths, summary
+from sgf_paper.experiment import Experiment
 from sgf_paper.progress import clock
+from sgf_paper.stereo_datasets import Dataset, dataset_flags, read_datasets
+from sgf_paper.strict_yaml import ConfigError
 
 PYTHON = cluster.PYTHON
 MARK = "SGF_RESULTS"  # in the environment of all that a run starts: the folder it works for
 DEFAULT_RESOURCES = {"mem_mb": 2000, "runtime": 120}  # of a job; minutes; the Snakefile has the others
-PROGRESS = str(config.PAPER / "sgf_paper" / "progress.py")
+PROGRESS = str(paths.PAPER / "sgf_paper" / "progress.py")
 LOCK_S = 5  # for what a killed run has started to end
 
 
@@ -90,7 +92,7 @@ def end_leftovers(settings: Settings) -> None:
 
 def make_debian_pairs(settings: Settings) -> None:
     """Converts the pairs that Debian packages ship; says so and goes on where they are left out."""
-    script = config.PROJECT / "datasets" / "debian_pairs.py"
+    script = paths.PROJECT / "datasets" / "debian_pairs.py"
     out = settings.generated / "debian_pairs"
     done = subprocess.run([PYTHON, script, out], capture_output=True, text=True)
     (settings.logs / "debian_pairs.log").write_text(done.stdout + done.stderr)
@@ -101,7 +103,7 @@ def make_debian_pairs(settings: Settings) -> None:
 def find_datasets(settings: Settings) -> dict[str, Dataset]:
     """Has sgf_eval list the data sets at hand and keeps the list as results/datasets.tsv."""
     log = settings.logs / "datasets.log"
-    flags = config.dataset_flags(settings.data, str(settings.generated))
+    flags = dataset_flags(settings.data, str(settings.generated))
     with log.open("w") as errors:
         command = [settings.bin / "sgf_eval", "datasets", *flags]
         done = subprocess.run(command, stdout=subprocess.PIPE, stderr=errors, text=True)
@@ -109,30 +111,14 @@ def find_datasets(settings: Settings) -> dict[str, Dataset]:
         raise RunError(f"data sets cannot be listed: {log.read_text().strip()} (log: {log})")
     listing = settings.results / "datasets.tsv"
     listing.write_text(done.stdout)
-    return config.read_datasets(listing)
-
-
-def has_data(stage: Experiment, datasets: dict[str, Dataset]) -> bool:
-    """Whether any data set that a stage can use is at hand."""
-    if stage.kind in ("table", "light_change"):
-        return bool(stage.present(datasets))
-    if stage.kind == "density":
-        return any(config.load_experiment(table).present(datasets) for table in stage.tables)
-    if stage.kind == "disparity_figure":
-        return stage.group(datasets) is not None
-    if stage.kind in (
-        "contact_sheet", "convergence", "direct_map", "joined_table", "mrpt_map", "odometry", "self_match",
-        "report", "semi_dense", "sequences", "shift_profile", "trajectory_table", "tuning",
-    ):  # fmt: skip
-        return True  # rendered
-    return stage.pair(datasets) is not None
+    return read_datasets(listing)
 
 
 def obstacle(stage: Experiment, datasets: dict[str, Dataset], programs: Path) -> str:
     """Why a stage cannot be made; empty if it can be."""
     if stage.kind == "mrpt_map" and not (programs / "sgf-odometry-cli").exists():
         return "the MRPT module is not part of the build"
-    return "" if has_data(stage, datasets) else "its data are not at hand"
+    return "" if stage.has_data(datasets) else "its data are not at hand"
 
 
 def repeats(stage: Experiment, runs: int) -> str:
@@ -163,7 +149,7 @@ def _snakemake_command(settings: Settings, stages: list[Experiment], flags: list
     return [
         "setpriv", "--pdeathsig", "KILL",  # it ends with this program, however that ends
         PYTHON, "-m", "snakemake",
-        "--snakefile", str(config.PAPER / "Snakefile"),
+        "--snakefile", str(paths.PAPER / "Snakefile"),
         "--directory", str(settings.results),
         *_where(settings),
         "--default-resources", *(f"{name}={value}" for name, value in DEFAULT_RESOURCES.items()),
@@ -299,8 +285,8 @@ def print_summary(
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="sgf_paper.run", description=__doc__)
     parser.add_argument("--bin", type=Path, required=True, help="folder of the programs")
-    parser.add_argument("--results", type=Path, default=config.PROJECT / "results")
-    parser.add_argument("--generated", type=Path, default=config.PROJECT / "datasets" / "generated")
+    parser.add_argument("--results", type=Path, default=paths.PROJECT / "results")
+    parser.add_argument("--generated", type=Path, default=paths.PROJECT / "datasets" / "generated")
     parser.add_argument("--data", default=os.environ.get("SGF_DATA", ""), help="downloaded data sets")
     parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="parallel jobs")
     parser.add_argument("--cluster", choices=["slurm"], help="submit each job; --jobs at a time")
@@ -330,7 +316,7 @@ def main() -> int:
     try:
         stages = [config.load_experiment(name) for name in arguments.stages]
         return 0 if make_stages(settings, stages) else 1
-    except (RunError, cluster.ClusterError, config.ConfigError, OSError) as error:
+    except (RunError, cluster.ClusterError, ConfigError, OSError) as error:
         print(f"Error: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from sgf_paper.config import Parameters, Sweep, TableBlock
+from sgf_paper.stereo_config import Parameters, Sweep, TableBlock
 
 ERRORS = ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct", "d1_pct"]
 RAW_COLUMNS = [

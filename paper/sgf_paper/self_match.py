@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, images, style, text
-from sgf_paper.config import FrameGroup, SelfMatch
+from sgf_paper.study_config import FrameGroup, SelfMatch, load_published_errors
 from sgf_paper.style import plt
 
 WIDTH = 10.0  # of a figure, inches
@@ -62,7 +62,7 @@ def case_table(figure: SelfMatch, scores: pd.DataFrame) -> pd.DataFrame:
     """The cases' lines. The paper's values stand beside its own frames' in its range only."""
     lines = scores["change"].isin(figure.cases) & scores["value"].isna()
     table = scores[lines].rename(columns={"change": "case"})
-    published = config.load_published_errors(figure)
+    published = load_published_errors(figure)
     paper = next((g for g in figure.groups if g.name == figure.published_group), None)
     values = []
     for row in table.itertuples():
@@ -97,7 +97,7 @@ def _row(figure: SelfMatch, lines: pd.DataFrame, cost: str) -> dict[str, str]:
     """One dissimilarity in one case: values of the frames, in the first range and the others."""
     own = lines[lines["cost"] == cost]
     first = own[[is_papers_range(figure, row) for row in own.itertuples()]]
-    published = config.load_published_errors(figure).get(cost, [])
+    published = load_published_errors(figure).get(cost, [])
     others = own.drop(first.index).groupby(["first_disparity", "end_disparity"], sort=False)
     return {
         "cost": cost + (" (extra)" if figure.columns[cost].extra else ""),

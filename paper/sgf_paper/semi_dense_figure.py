@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, style, text
-from sgf_paper.config import SemiDense, SemiDenseRow
+from sgf_paper.study_config import SemiDense, SemiDenseRow
 
 WIDTH = 10.0  # of the figure, inches
 PIXELS = 400  # across a panel

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, images, style
-from sgf_paper.config import ShiftProfile
+from sgf_paper.study_config import ShiftProfile
 from sgf_paper.style import plt
 
 WIDTH = 7.0  # of the figure, inches

@@ -1,5 +1,7 @@
-"""YAML files read strictly: a text that is none, one that would fill the memory, an unknown or a missing key, or a value
-of another type is a ConfigError that names file and key.
+"""YAML files read strictly as typed objects.
+
+A text that is none, one that would fill the memory, an unknown or a missing key, or a value of another type is a
+ConfigError that names file and key.
 """
 
 from __future__ import annotations
@@ -8,9 +10,10 @@ import functools
 import itertools
 import math
 import reprlib
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any, Callable, get_args, get_origin, get_type_hints
+from types import UnionType
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import yaml
 
@@ -71,30 +74,16 @@ def read_yaml(path: Path) -> dict[str, Any]:
     return node
 
 
-_kinds_of = functools.cache(get_type_hints)
+_kinds_of = functools.cache(functools.partial(get_type_hints, include_extras=True))
 
 
-def _is_of(kind: Any, value: Any) -> bool:
-    """Whether a value of a YAML file is of a type, and what it holds too. True is no number."""
-    outer, inner = get_origin(kind), get_args(kind)
-    if outer is list:
-        return isinstance(value, list) and all(_is_of(inner[0], item) for item in value)
-    if outer is dict:
-        return isinstance(value, dict) and all(all(map(_is_of, inner, item)) for item in value.items())
-    return kind is Any or type(value) is kind
+def _inside(where: str, key: Any) -> str:
+    """The place of a key: `file: key`, and below that `file: key.key`."""
+    return f"{where}.{key}" if ": " in where else f"{where}: {key}"
 
 
-def require(kind: Any, value: Any, where: str) -> None:
-    """@throws ConfigError for a value that is not of a type."""
-    if not _is_of(kind, value):
-        name = str(kind) if get_origin(kind) else kind.__name__
-        raise ConfigError(f"{where}: expected {name.replace('typing.', '')}, found {reprlib.repr(value)}")
-
-
-def build(cls: type, node: Any, where: str) -> Any:
-    """Makes dataclass `cls` of a YAML map whose keys must be exactly its fields."""
-    if not isinstance(node, dict):
-        raise ConfigError(f"{where}: expected a map, found {reprlib.repr(node)}")
+def _build_fields(cls: type, node: dict[str, Any], where: str) -> Any:
+    """Makes a dataclass of a map whose keys must be exactly its fields."""
     known = {f.name: f for f in fields(cls)}
     for key in node:
         if key not in known:
@@ -102,20 +91,36 @@ def build(cls: type, node: Any, where: str) -> Any:
     for name, f in known.items():
         if name not in node and f.default is MISSING and f.default_factory is MISSING:
             raise ConfigError(f"{where}: key '{name}' is missing")
-    return cls(**node)
-
-
-def build_typed(cls: type, node: Any, where: str) -> Any:
-    """As build(), and values have to be of their fields' types."""
-    built = build(cls, node, where)
-    for name, kind in _kinds_of(cls).items():
-        require(kind, getattr(built, name), f"{where}.{name}")
+    kinds = _kinds_of(cls)
+    built = cls(**{key: build(kinds[key], value, _inside(where, key)) for key, value in node.items()})
+    if hasattr(built, "check"):
+        built.check(where)
     return built
 
 
-def build_each(
-    cls: type, nodes: Any, where: str, by: Callable[[type, Any, str], Any] = build
-) -> dict[str, Any]:
-    """Makes dataclass `cls` of each of some named YAML maps, by build() or build_typed()."""
-    require(dict[str, Any], nodes, where)
-    return {name: by(cls, node, f"{where}.{name}") for name, node in nodes.items()}
+def build(kind: Any, value: Any, where: str) -> Any:
+    """Makes of what a YAML file holds what a type says: also what lists and maps hold, and dataclasses of maps.
+
+    `Annotated[T, make]` says that make(value, where) makes the T. A dataclass may have a method check(where), which
+    throws if its values do not fit together. A whole number is a float too; true is no number.
+    @param where file and key, for errors.
+    @throws ConfigError for a value of another type.
+    """
+    outer, inner = get_origin(kind), get_args(kind)
+    if outer is Annotated:
+        return inner[1](value, where)
+    if outer is UnionType:  # T | None
+        return None if value is None else build(inner[0], value, where)
+    if outer is list and isinstance(value, list):
+        return [build(inner[0], item, f"{where}[{index}]") for index, item in enumerate(value)]
+    if outer is dict and isinstance(value, dict):
+        return {
+            build(inner[0], key, f"{where}: a key"): build(inner[1], item, _inside(where, key))
+            for key, item in value.items()
+        }
+    if is_dataclass(kind) and isinstance(value, dict):
+        return _build_fields(kind, value, where)
+    if kind is Any or type(value) is kind or (kind is float and type(value) is int):
+        return value
+    name = "a list" if outer is list else "a map" if outer is dict or is_dataclass(kind) else kind.__name__
+    raise ConfigError(f"{where}: expected {name}, found {reprlib.repr(value)}")

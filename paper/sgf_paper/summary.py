@@ -8,48 +8,9 @@ import pandas as pd
 
 from sgf_paper import bench, catalog, config, text, trajectory_table
 from sgf_paper.catalog import Source
-from sgf_paper.config import Dataset, Experiment
-
-FILES = {
-    "table": "tables/{}.md (.csv, .tex, _scenes.csv, _wins.csv, _tuned.csv)",
-    "density": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _equal.csv)",
-    "direct_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
-    "disparity_figure": "figures/{}.png (.pdf)",
-    "joined_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _light.csv, _timings.csv)",
-    "light_change": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
-    "benchmark": "tables/{}.md (.csv)",
-    "contact_sheet": "figures/{}.png (.pdf)",
-    "convergence": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
-    "mrpt_map": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
-    "odometry": "figures/{0}.png (.pdf), tables/{0}.md (.csv, _compared.csv, _runs.csv)",
-    "report": "report.html, report.pdf, tables/{0}_verdicts.csv (_claims.csv, _values.csv, _pairs.csv)",
-    "sequences": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
-    "semi_dense": "figures/{0}.png (.pdf), tables/{0}.md (.csv)",
-    "self_match": "figures/{0}.png, {0}_curves.png (.pdf), tables/{0}.md (.csv, _curves.csv)",
-    "shift_profile": "figures/{0}.png (.pdf), tables/{0}.csv (_minima.csv)",
-    "trajectory_table": "figures/{0}.png (.pdf), tables/{0}.md (.csv, .tex, _compared.csv, _ate_compared.csv, _runs.csv)",
-    "tuning": "{folder}/*.yaml, tables/{0}.md (.csv)",
-}
-MAIN_FILE = {
-    "table": "tables/{}.csv",
-    "density": "figures/{}.png",
-    "direct_map": "tables/{}.csv",
-    "disparity_figure": "figures/{}.png",
-    "joined_table": "tables/{}.csv",
-    "light_change": "tables/{}.csv",
-    "benchmark": "tables/{}.csv",
-    "contact_sheet": "figures/{}.png",
-    "convergence": "tables/{}.csv",
-    "mrpt_map": "tables/{}.csv",
-    "odometry": "tables/{}.csv",
-    "report": "{}.html",
-    "sequences": "tables/{}.csv",
-    "semi_dense": "tables/{}.csv",
-    "self_match": "tables/{}.csv",
-    "shift_profile": "tables/{}.csv",
-    "trajectory_table": "tables/{}.csv",
-    "tuning": "tables/{}.csv",
-}
+from sgf_paper.config import KINDS
+from sgf_paper.experiment import Experiment
+from sgf_paper.stereo_datasets import Dataset
 
 
 EARLIER = "what is shown is of an earlier run"
@@ -64,7 +25,19 @@ def read_reasons(listing: Path) -> dict[str, str]:
 
 def main_file(stage: Experiment, results: Path) -> Path:
     """The file whose presence and time say whether and when a stage was made."""
-    return results / MAIN_FILE[stage.kind].format(stage.name)
+    return results / KINDS[stage.kind].main_file.format(name=stage.name)
+
+
+def _files(stage: Experiment) -> str:
+    """What a stage makes: of figures and of tables a name, and how the others end."""
+    kind = KINDS[stage.kind]
+    texts = [kind.others.format(name=stage.name, folder=getattr(stage, "folder", ""))] if kind.others else []
+    tables = sorted(kind.tables, key=lambda end: end != ".md")  # that is made to be read
+    for folder, ends in (("figures", kind.figures), ("tables", tables)):
+        if ends:
+            others = f" ({', '.join(ends[1:])})" if ends[1:] else ""
+            texts.append(f"{folder}/{stage.name}{ends[0]}{others}")
+    return ", ".join(texts)
 
 
 def _table_lines(path: Path) -> list[str]:
@@ -294,8 +267,7 @@ def stage_lines(stage: Experiment, results: Path, started: float, failed: bool =
     state = "made" if path.stat().st_mtime >= started else "up to date"
     if failed:
         state = f"FAILED; {EARLIER}:"
-    files = FILES[stage.kind].format(stage.name, folder=getattr(stage, "folder", ""))
-    head = f"  {stage.name:14} {state:11} {files}"
+    head = f"  {stage.name:14} {state:11} {_files(stage)}"
     return [head, *(f"    {line}" for line in _measured(stage, results))]
 
 

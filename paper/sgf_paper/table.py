@@ -9,8 +9,10 @@ from pathlib import Path
 import pandas as pd
 
 from sgf_paper import config, scores, text, tuning
-from sgf_paper.config import Sweep, Table, TableBlock
 from sgf_paper.deviations import load_deviations
+from sgf_paper.stereo_config import Sweep, Table, TableBlock, load_published
+from sgf_paper.stereo_datasets import read_datasets
+from sgf_paper.strict_yaml import read_yaml
 
 CSV_COLUMNS = ["dataset", "region", "matcher", "cost", "quantity", "measured", "published", "scenes"]
 CHOICE_COLUMNS = ["dataset", "region", "matcher", "column", "fold", "parameters", "reached"]
@@ -40,7 +42,7 @@ class BlockMaker:
         self.table = table
         self.block = block
         self.sweep = block.sweep
-        self.published = config.load_published(table, block.published)
+        self.published = load_published(table, block.published)
         self.scores = {name: scores.read_scores(raw, self.sweep, name) for name in present}
 
     def make(self) -> Report:
@@ -190,7 +192,7 @@ def options_of_columns(raw: Path, sweep: Sweep, dataset: str) -> dict[str, str]:
     lines = {}
     for column in sweep.columns:
         path = scores.raw_path(raw, sweep.name, dataset, column).with_suffix(".options.yaml")
-        options = config.read_yaml(path)["options"]
+        options = read_yaml(path)["options"]
         varying = SET_BY_SWEEP | (OPENCV_BY_WINDOW if sweep.columns[column].is_opencv else set())
         fixed = {key: value for key, value in options.items() if key not in varying}
         lines[column] = ", ".join(text.flatten(fixed))
@@ -208,7 +210,7 @@ def write_csvs(report: Report, out: Path, name: str) -> None:
 def make_table(name: str, raw: Path, listing: Path, out: Path) -> None:
     """Makes table `name` from the raw scores in folder `raw`."""
     table = config.load_experiment(name)
-    datasets = config.read_datasets(listing)
+    datasets = read_datasets(listing)
     present = table.present(datasets)
     report = make_report(table, raw, present)
     write_csvs(report, out, name)

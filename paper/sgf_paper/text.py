@@ -10,7 +10,7 @@ import jinja2
 import markupsafe
 import pandas as pd
 
-from sgf_paper import config
+from sgf_paper import paths
 
 LABELS = {
     "mean_px": "mean px",
@@ -179,7 +179,7 @@ def _html_prose(text: object) -> markupsafe.Markup:
 def render(template: str, **context: object) -> str:
     """Fills a template of paper/templates."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(config.PAPER / "templates"),
+        loader=jinja2.FileSystemLoader(paths.PAPER / "templates"),
         undefined=jinja2.StrictUndefined,
         autoescape=jinja2.select_autoescape(["html.j2"], default=False),
         trim_blocks=True,

@@ -27,7 +27,8 @@ from optuna.distributions import BaseDistribution, FloatDistribution, IntDistrib
 from optuna.trial import FrozenTrial, TrialState
 
 from sgf_paper import config, odometry_scores, paired
-from sgf_paper.config import ConfigError, SearchRange, TrackingTuning
+from sgf_paper.strict_yaml import ConfigError, read_yaml
+from sgf_paper.tracking_config import SearchRange, TrackingTuning
 
 DIGITS = 3  # of the options that are tried, so that what is written is what was run
 LOCK_SECONDS = 120  # that a job waits for others at the database
@@ -68,7 +69,7 @@ class Tracker:
         """What the program notes of a run with the column's own options: all its options, and its build."""
         with tempfile.TemporaryDirectory() as out:
             self._start(self.command(sequence, self.tuning.conditions[0], 0, {}), Path(out))
-            return config.read_yaml(Path(out) / "options.yaml")
+            return read_yaml(Path(out) / "options.yaml")
 
     def error_pct(self, sequence: str, condition: str, run: int, options: Options) -> float:
         """ATE RMSE in percent of the path; of a run that fails the error beyond which runs fail."""

@@ -10,10 +10,10 @@ import numpy as np
 import pandas as pd
 
 from sgf_paper import config, paired, repeated_runs, style, text
-from sgf_paper.config import TrajectoryTable
 from sgf_paper.deviations import load_deviations
 from sgf_paper.repeated_runs import KEYS
 from sgf_paper.style import plt
+from sgf_paper.tracking_config import TrajectoryTable, load_published_trajectories
 
 RULES = ["scale", "ate"]  # of success; errors are those of runs that succeed by the first, the paper's
 ERRORS = ["ate_mm", "ate_mean_mm", "rpe_one_second_mm", "rpe_one_second_deg", "orientation_deg"]
@@ -53,7 +53,7 @@ def read_runs(study: TrajectoryTable, raw: Path, sequences: list[str], runs: int
 
 def _published_mm(study: TrajectoryTable) -> dict[tuple[str, str], float]:
     """The paper's mean ATE by sequence and column."""
-    published = config.load_published_trajectories(study)
+    published = load_published_trajectories(study)
     return {
         (name, column): 1000 * values[sequence.published]
         for name, sequence in study.sequences.items()

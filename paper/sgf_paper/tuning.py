@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from sgf_paper.config import Parameters, Tuning
 from sgf_paper.scores import at, curve, interpolate
+from sgf_paper.stereo_config import Parameters, Tuning
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from sgf_paper import config, text
+from sgf_paper.strict_yaml import read_yaml
 
 
 def _line(column: str, fold: dict[str, Any]) -> dict[str, Any]:
@@ -52,7 +53,7 @@ def _row(line: pd.Series) -> dict[str, Any]:
 def make_report(name: str, found: Path, tables: Path) -> None:
     """Makes <name>.csv and <name>.md of what was found, a file a column."""
     tuning = config.load_experiment(name)
-    documents = {column: config.read_yaml(found / f"{column}.yaml") for column in tuning.columns}
+    documents = {column: read_yaml(found / f"{column}.yaml") for column in tuning.columns}
     table = make_table(documents)
     text.write_csv(table, tables / f"{name}.csv")
     first = next(iter(documents.values()))  # all have the same programs, data and budget

@@ -24,7 +24,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from sgf_paper import config, record
+from sgf_paper import paths, record
 from sgf_paper import run as run_module
 from sgf_paper.progress import clock
 from sgf_paper.strict_yaml import ConfigError, read_yaml
@@ -35,7 +35,7 @@ TIMED = re.compile(r"timings?\b|_timings\.|bench_")  # files that say how long s
 WITHOUT_VALUES = re.compile(r".*\.(png|pdf|ply|pfm|md|tex|html)|(.*\.)?options\.yaml")
 CONDITIONS_IN_YAML = ("build", "data", "optuna")  # keys that say what a file was made with
 NOTHING = "nothing to compare"
-TOLERANCES = config.PAPER / "tolerances.yaml"
+TOLERANCES = paths.PAPER / "tolerances.yaml"
 NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 
@@ -142,7 +142,7 @@ def repeat(run: Recorded, results: Path, scratch: Path) -> int:
     show_results(results, scratch, outputs)
     for output in run.node["outputs"]:
         (scratch / output).parent.mkdir(parents=True, exist_ok=True)
-    environment = {**run_module.environment(results), "PYTHONPATH": str(config.PAPER)}
+    environment = {**run_module.environment(results), "PYTHONPATH": str(paths.PAPER)}
     with (scratch / "log.txt").open("w") as log:
         done = subprocess.run(run.node["command"], cwd=scratch, env=environment, stdout=log, stderr=log)
     return done.returncode
@@ -272,7 +272,7 @@ def verify(results: Path, seed: int, minutes: float) -> bool:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="sgf_paper.verify", description=__doc__)
-    parser.add_argument("--results", type=Path, default=config.PROJECT / "results")
+    parser.add_argument("--results", type=Path, default=paths.PROJECT / "results")
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--minutes", type=float, default=10, help="that the runs took when they were recorded")
     arguments = parser.parse_args()

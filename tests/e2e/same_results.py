@@ -31,14 +31,14 @@ PROJECT = HERE.parents[1]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(PROJECT / "paper"))
 
-from sgf_paper import config, file_lock, verify  # noqa: E402
+from sgf_paper import file_lock, paths, verify  # noqa: E402
 
 RESULTS = PROJECT / "results"
 UNDISTURBED = PROJECT / "build" / "undisturbed_results"
 DISTURBED = PROJECT / "build" / "disturbed_results"
 LOCK = PROJECT / "build" / "same_results.lock"
 KEPT = ("reference", "external")  # what a run finds in its results
-EXPERIMENTS = sorted(path.stem for path in config.EXPERIMENTS.glob("*.yaml"))
+EXPERIMENTS = sorted(path.stem for path in paths.EXPERIMENTS.glob("*.yaml"))
 
 
 # --- the comparison -------------------------------------------------------------------------------

@@ -10,14 +10,14 @@ import io
 import tempfile
 from pathlib import Path
 
-from sgf_paper import config, fetch
+from sgf_paper import fetch, paths
 from sgf_paper.catalog import Catalog, load_catalog, needed_by
-from sgf_paper.config import ConfigError
 from sgf_paper.download import Patience
+from sgf_paper.strict_yaml import ConfigError
 
 FOLDER = tempfile.TemporaryDirectory(prefix="sgf_fuzz_")  # removed at the end of the process
-config.EXPERIMENTS = Path(FOLDER.name)
-(config.EXPERIMENTS / "experiment.yaml").write_text("sequences: {a: {folder: us/a}, middlebury2014_q: {}}\n")
+paths.EXPERIMENTS = Path(FOLDER.name)
+(paths.EXPERIMENTS / "experiment.yaml").write_text("sequences: {a: {folder: us/a}, middlebury2014_q: {}}\n")
 
 
 def use(catalog: Catalog) -> None:

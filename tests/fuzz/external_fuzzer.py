@@ -11,7 +11,8 @@ import tempfile
 from pathlib import Path
 
 from sgf_paper import external
-from sgf_paper.config import ConfigError, load_external_system
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.tracking_config import load_external_system
 
 FOLDER = tempfile.TemporaryDirectory(prefix="sgf_fuzz_")  # removed at the end of the process
 

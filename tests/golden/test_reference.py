@@ -14,9 +14,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sgf_paper import config
+from sgf_paper import paths
 
-REFERENCE = config.PROJECT / "results" / "reference"
+REFERENCE = paths.PROJECT / "results" / "reference"
 TOLERANCE_PX = 0.005
 TOLERANCE_PCT = 0.05
 SCORES = ["mean_px", "bad1_pct", "bad2_pct", "bad4_pct", "d1_pct", "invalid_pct"]

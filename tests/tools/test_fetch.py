@@ -19,10 +19,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from sgf_paper import catalog, config, fetch
+from sgf_paper import catalog, fetch, paths
 from sgf_paper.download import Patience
 
-PROGRAM = config.PROJECT / "datasets" / "fetch"
+PROGRAM = paths.PROJECT / "datasets" / "fetch"
 HTML = b"<!DOCTYPE html><html><body>Please log in</body></html>"
 IMPATIENT = ["--timeout", "1", "--attempts", "3", "--pause", "0.05"]
 

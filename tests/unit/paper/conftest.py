@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sgf_paper import config, odometry_scores
-from sgf_paper.config import Column, Dataset, Grid, Sweep, Table, TableBlock, Tuning
+from sgf_paper import odometry_scores, paths
+from sgf_paper.stereo_config import Column, Grid, Sweep, Table, TableBlock, Tuning
+from sgf_paper.stereo_datasets import Dataset
 
 HEADER = (
     "dataset,scene,region,matcher,column,window,uniqueness,truth_px,matched_px,"
@@ -122,7 +123,7 @@ def write_raw(tmp_path, sweep):
 @pytest.fixture
 def experiments(tmp_path, monkeypatch):
     """An empty folder in place of paper/experiments."""
-    monkeypatch.setattr(config, "EXPERIMENTS", tmp_path)
+    monkeypatch.setattr(paths, "EXPERIMENTS", tmp_path)
     return tmp_path
 
 

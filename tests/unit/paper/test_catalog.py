@@ -3,8 +3,8 @@
 import pytest
 import yaml
 
-from sgf_paper import catalog, config
-from sgf_paper.config import ConfigError
+from sgf_paper import catalog, paths
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
 VALID = {
     "archives": {"a.zip": {"urls": ["https://example.org/a.zip"], "bytes": 7}, "hand.zip": {}},
@@ -55,9 +55,9 @@ def test_entries_and_groups(tmp_path):
         (("archives", "a.zip", "bytes"), True, "archives.a.zip.bytes: expected int, found True"),
         (("archives", "a.zip", "bytes"), -7, "archives.a.zip: a number of bytes is negative"),
         (("archives", "a.zip", "about_bytes"), 10**400, "archives.a.zip: a number of bytes is negative or beyond"),
-        (("archives", "a.zip", "urls"), "https://example.org", "archives.a.zip.urls: expected list[str]"),
-        (("archives",), ["a.zip"], "archives: expected dict[str, Any], found ['a.zip']"),
-        (("archives", 7), {}, "archives: expected dict[str, Any]"),
+        (("archives", "a.zip", "urls"), "https://example.org", "archives.a.zip.urls: expected a list, found"),
+        (("archives",), ["a.zip"], "archives: expected a map, found ['a.zip']"),
+        (("archives", 7), {}, "archives: a key: expected str, found 7"),
         (("archives", "../a.zip"), {}, "'../a.zip' is not a plain file name"),
         (("archives", "lock"), {}, "archives.lock: the name ends in none of .zip, .tar"),
         (("archives", "a" * 200 + ".zip"), {}, "is longer than 200 bytes"),
@@ -72,13 +72,13 @@ def test_entries_and_groups(tmp_path):
         (("datasets", "a", "folder"), "us", "datasets.b: its folder is, or lies in, that of 'a'"),
         (("datasets", "a", "holds"), ["x/../../y"], "leads out"),
         (("datasets", "a", "folder"), "a\0b", "leads out"),
-        (("datasets", "a", "holds"), ["x", 1], "datasets.a.holds: expected list[str]"),
+        (("datasets", "a", "holds"), ["x", 1], "datasets.a.holds[1]: expected str, found 1"),
         (("datasets", "../a"), {}, "'../a' is not a plain file name"),
-        (("datasets", "a"), "x", "datasets.a: expected dict[str, Any], found 'x'"),
+        (("datasets", "a"), "x", "datasets.a: expected a map, found 'x'"),
         (("datasets", "a", "unpacked_bytes"), -1, "datasets.a: a number of bytes is negative"),
         (("datasets", "a", "publisher"), ["we"], "publisher is ['we']; known: we"),
-        (("datasets", "a", "ways"), [{"archive": "a.zip"}], "datasets.a.ways: expected list[list[Any]]"),
-        (("datasets", "a", "ways"), [[{"archive": ["a.zip"]}]], "datasets.a.ways.archive: expected str"),
+        (("datasets", "a", "ways"), [{"archive": "a.zip"}], "datasets.a.ways[0]: expected a list"),
+        (("datasets", "a", "ways"), [[{"archive": ["a.zip"]}]], "datasets.a.ways[0][0].archive: expected str"),
         (("datasets", "a", "publisher"), "they", "publisher is 'they'; known: we"),
         (("datasets", "a", "ways"), [[{"archive": "c.zip"}]], "datasets.a: no archive 'c.zip'"),
         (("datasets", "a", "ways"), [[{"archive": "hand.zip"}]], "'hand.zip' has no urls"),
@@ -87,7 +87,7 @@ def test_entries_and_groups(tmp_path):
         (("datasets", "b", "ways"), [[]], "datasets.b.ways: one has no pieces"),
         (("groups", "both"), ["a", "c"], "groups.both: no data set 'c'"),
         (("groups", "both"), [], "groups.both: names no data set"),
-        (("groups", "both"), "a", "groups: expected dict[str, list[str]]"),
+        (("groups", "both"), "a", "groups.both: expected a list, found 'a'"),
         (("groups", "a"), ["b"], "a data set has this name"),
         (("extra",), {}, "expected archives, publishers"),
         ((7,), {}, "expected archives, publishers"),
@@ -119,7 +119,7 @@ def own():
 
 
 def test_every_stereo_data_set_has_an_entry_that_unpacks_to_where_it_is_looked_for(own):
-    for name, layout in config.read_yaml(config.STEREO_LAYOUTS).items():
+    for name, layout in read_yaml(paths.STEREO_LAYOUTS).items():
         assert own.datasets[name].folder == layout["folders"][0], name
 
 
@@ -151,5 +151,5 @@ def test_experiments_name_what_is_fetched_for_them(own):
     assert catalog.needed_by(["fig1"], own) == ["icl_nuim_lr_kt2"]
     assert catalog.needed_by(["table3"], own) == own.groups["euroc"]  # through the tables that it joins
     assert catalog.needed_by(["scenes"], own) == []
-    every = [path.stem for path in config.EXPERIMENTS.glob("*.yaml")]
+    every = [path.stem for path in paths.EXPERIMENTS.glob("*.yaml")]
     assert set(catalog.needed_by(every, own)) == {*own.groups["paper"], "middlebury2014_q"}

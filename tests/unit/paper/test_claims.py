@@ -8,13 +8,14 @@ import pandas as pd
 import pytest
 import yaml
 
-from sgf_paper import claims, comparison, config, pairs
+from sgf_paper import claims, comparison, config, pairs, paths
 from sgf_paper.claims import FAILS, FEW, HOLDS, MISSING, OPEN, ClaimError, Outcome
-from sgf_paper.config import Claim, ConfigError, Interval, Ordering, Paired, ReportPairs, Value
 from sgf_paper.pairs import Rule
+from sgf_paper.report_config import Claim, Interval, Ordering, Paired, ReportPairs, Value, load_claims
+from sgf_paper.strict_yaml import ConfigError
 
 RULE = Rule(least=10, margin_pct=5)
-CLAIMS = config.load_claims()
+CLAIMS = load_claims()
 EVERY = [*CLAIMS.claims, *CLAIMS.slips, *CLAIMS.new]
 ORDER = Ordering("t", "cost", "error", "sgf", ["sad", "pm"], groups=["frame"])
 PAIR = Paired("t", "cost", "error", "sgf", ["sad"], pairs=["scene"], clusters=["scene"])
@@ -176,7 +177,7 @@ def test_an_interval_takes_enough_runs_however_many_pairs_they_make(runs, state)
 
 
 def test_a_claim_on_successes_takes_ten_runs():
-    frame = pd.read_csv(config.REFERENCE / "table3_dso_compared.csv")
+    frame = pd.read_csv(paths.REFERENCE / "table3_dso_compared.csv")
     claim = next(claim for claim in EVERY if claim.id == "ngv_motion_local_light")
     for runs, verdict in ((13, claims.REPRODUCED), (3, claims.UNDECIDED)):
         assert claims.judge_checks(claim.checks, lambda _: frame.assign(runs=runs), RULE).verdict == verdict
@@ -267,11 +268,11 @@ def test_every_statement_has_a_check_or_says_why_not():
 
 @pytest.mark.parametrize("claim", EVERY, ids=[claim.id for claim in EVERY])
 def test_checks_fit_the_tables_they_read(claim):
-    finding = claims.judge(claim, {"reference": claims.Tables(config.REFERENCE)}, comparison.PublishedRows(), RULE)
+    finding = claims.judge(claim, {"reference": claims.Tables(paths.REFERENCE)}, comparison.PublishedRows(), RULE)
     if finding.published:
         assert MISSING not in {outcome.state for outcome in finding.published.outcomes}
     for check in claim.checks:
-        name = next(path.stem for path in config.EXPERIMENTS.glob("*.yaml") if is_made_by(check.table, path.stem))
+        name = next(path.stem for path in paths.EXPERIMENTS.glob("*.yaml") if is_made_by(check.table, path.stem))
         assert config.load_experiment(name).kind != "report"
 
 
@@ -300,8 +301,10 @@ def test_published_rows_say_of_bad_pixels_in_mesh_stereo_that_the_original_has_f
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"checks": [{"kind": "guess"}]}, "claims.c: checks: kind is 'guess'; known: ordering, paired"),
-        ({"checks": [{"kind": "value", "table": "t"}]}, "claims.c: checks: key 'quantity' is missing"),
+        ({"checks": [{"kind": "guess"}]}, r"claims\[0\].checks\[0\]: kind is 'guess'; known: ordering, paired"),
+        ({"checks": [{"kind": "value", "table": "t"}]}, r"claims\[0\].checks\[0\]: key 'quantity' is missing"),
+        ({"published": [{"kind": ["value"]}]}, r"claims\[0\].published\[0\].kind: expected str, found \['value'\]"),
+        ({"checks": ["value"]}, r"claims\[0\].checks\[0\]: expected a map, found 'value'"),
         ({"colour": "red"}, "unknown key 'colour'"),
     ],
 )
@@ -310,7 +313,7 @@ def test_mistakes_in_claims_are_named(tmp_path, change, message):
     path = tmp_path / "claims.yaml"
     path.write_text(yaml.safe_dump({"claims": [claim], "slips": [], "new": []}))
     with pytest.raises(ConfigError, match=message):
-        config.load_claims(path)
+        load_claims(path)
 
 
 def test_a_name_stands_for_one_statement(tmp_path):
@@ -318,4 +321,4 @@ def test_a_name_stands_for_one_statement(tmp_path):
     path = tmp_path / "claims.yaml"
     path.write_text(yaml.safe_dump({"claims": [claim], "slips": [], "new": [claim]}))
     with pytest.raises(ConfigError, match=r"\['c'\] is there twice"):
-        config.load_claims(path)
+        load_claims(path)

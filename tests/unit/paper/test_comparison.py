@@ -4,7 +4,8 @@ import pandas as pd
 import pytest
 
 from sgf_paper import comparison, config
-from sgf_paper.config import Comparison, ConfigError, Tolerance
+from sgf_paper.published_values import Comparison, Tolerance
+from sgf_paper.strict_yaml import ConfigError
 
 BM_SGF = {"part": "stereo_bm, all", "row": "sgf", "column": "mean_px"}  # published: 3.29
 

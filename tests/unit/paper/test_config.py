@@ -1,13 +1,18 @@
 """Reading of experiments: what is in the project is sound, and mistakes are named."""
 
+from pathlib import Path
+
 import pytest
 import yaml
 
-from sgf_paper import config
-from sgf_paper.config import ConfigError, Dataset
+from sgf_paper import config, paths, run, summary
+from sgf_paper.experiment import Experiment
+from sgf_paper.stereo_config import load_published
+from sgf_paper.stereo_datasets import Dataset, read_datasets
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
-NAMES = sorted(path.stem for path in config.EXPERIMENTS.glob("*.yaml"))
-TABLE1 = yaml.safe_load((config.EXPERIMENTS / "table1.yaml").read_text())
+NAMES = sorted(path.stem for path in paths.EXPERIMENTS.glob("*.yaml"))
+TABLE1 = yaml.safe_load((paths.EXPERIMENTS / "table1.yaml").read_text())
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -15,9 +20,40 @@ def test_every_experiment_is_read_and_named_after_its_file(name):
     assert config.load_experiment(name).name == name
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_an_experiment_is_made_when_a_file_that_it_makes_is_there(name):
+    stage = config.load_experiment(name)
+    kind = config.KINDS[stage.kind]
+    main = str(summary.main_file(stage, Path()))
+    assert main in kind.files(name) or main in kind.others.format(name=name, folder="").split(", ")
+
+
+def test_a_new_kind_is_one_line_for_loader_run_and_summary(experiments, monkeypatch):
+    monkeypatch.setitem(config.KINDS, "toy", config.Kind(Experiment, (".csv", "_more.csv", ".md"), (".png", ".pdf")))
+    (experiments / "new.yaml").write_text("{kind: toy, name: new, title: A toy}")
+    stage = config.load_experiment("new")
+    assert run.obstacle(stage, {}, experiments) == ""
+    assert summary.stage_lines(stage, experiments, 0) == ["  new            NOT MADE"]
+    (experiments / "tables").mkdir()
+    (experiments / "tables" / "new.csv").touch()
+    said = "figures/new.png (.pdf), tables/new.md (.csv, _more.csv)"
+    assert summary.stage_lines(stage, experiments, 0) == [f"  new            made        {said}"]
+
+
+@pytest.mark.parametrize("name", ["table1", "density", "fig4", "light_change", "bench_stereo"])
+def test_what_is_not_rendered_needs_a_data_set(name, tmp_path):
+    stage = config.load_experiment(name)
+    assert run.obstacle(stage, {}, tmp_path) == "its data are not at hand"
+    pair = tmp_path / "Motorcycle"
+    pair.mkdir()
+    (pair / "im0.png").touch()
+    datasets = {"debian_pairs": Dataset("debian_pairs", tmp_path, 1)}
+    assert run.obstacle(stage, datasets, tmp_path) == ""
+
+
 def test_columns_of_the_paper_come_first_and_in_its_order():
     for table in config.load_experiments("table").values():
-        paper = list(config.load_published(table, "stereo_bm")["mean_px"])
+        paper = list(load_published(table, "stereo_bm")["mean_px"])
         for sweep in table.sweeps:
             assert sweep.main_columns == paper == list(sweep.columns)[: len(paper)]
 
@@ -32,11 +68,11 @@ def test_tables_have_the_papers_two_matchers_and_semi_global_matching(name):
 
 def test_published_values_are_the_papers():
     table = config.load_experiment("table1")
-    published = config.load_published(table, "stereo_bm")
+    published = load_published(table, "stereo_bm")
     assert published["mean_px"]["sgf"] == 3.29
     assert published["invalid_pct"]["orig"] == 40.44
-    assert config.load_published(table, "mesh_stereo")["bad4_pct"]["sgf"] == 12.53
-    assert config.load_published(table, "") == {}
+    assert load_published(table, "mesh_stereo")["bad4_pct"]["sgf"] == 12.53
+    assert load_published(table, "") == {}
 
 
 def test_own_parameters_replace_the_shared_ones():
@@ -65,12 +101,21 @@ def change_block(**changes):
     [
         (change(colour="red"), "unknown key 'colour'"),
         ({k: v for k, v in TABLE1.items() if k != "blocks"}, "key 'blocks' is missing"),
-        (change_block(colour="red"), "blocks: unknown key 'colour'"),
+        (change_block(colour="red"), r"blocks\[0\]: unknown key 'colour'"),
         (change(kind="chart"), "kind is 'chart'"),
         (change_block(fixed={"window": 10, "uniqueness": 10}), "window 10 is not on the sweep's grid"),
         (change_block(fixed={"window": 9, "uniqueness": 11}), "uniqueness 11 is not on the sweep's grid"),
         (change_block(tuning={"objective": "bad2_pct"}), "tuning: key 'kept_pct' is missing"),
+        (change_block(fixed_of={"orig": {"widow": 9}}), "fixed, of orig: unknown key 'widow'"),
+        (change_block(fixed_of={"sdf": {"window": 9}}), r"fixed_of: no column \['sdf'\] in sweep stereo_bm"),
         (change_block(sweep="nowhere"), "nowhere.yaml: cannot be read"),
+        (change_block(sweep=["stereo_bm"]), r"bad.yaml: blocks\[0\].sweep: expected str, found \['stereo_bm'\]"),
+        (change_block(tuning="best"), r"bad.yaml: blocks\[0\].tuning: expected a map, found 'best'"),
+        (change_block(tuning={"objective": "x", "kept_pct": "all"}), "tuning.kept_pct: expected float, found 'all'"),
+        (change(title=7), "bad.yaml: title: expected str, found 7"),
+        (change(datasets="all"), "bad.yaml: datasets: expected a list, found 'all'"),
+        (change(near_duplicates=[["a", 1]]), r"bad.yaml: near_duplicates\[0\]\[1\]: expected str, found 1"),
+        (change(blocks={}), "bad.yaml: blocks: expected a list, found {}"),
         ([1, 2], "expected a map"),
     ],
 )
@@ -89,13 +134,13 @@ def test_unreadable_yaml_names_its_file(experiments):
 def test_an_unknown_published_entry_is_an_error(table):
     table.published = "table_7"
     with pytest.raises(ConfigError, match="no entry table_7.stereo_bm"):
-        config.load_published(table, "stereo_bm")
+        load_published(table, "stereo_bm")
 
 
 def test_listing_of_datasets(tmp_path):
     listing = tmp_path / "datasets.tsv"
     listing.write_text("a\t/data/with blank/a\t3\nb\t/data/b\t11\n")
-    found = config.read_datasets(listing)
+    found = read_datasets(listing)
     assert [(d.name, str(d.folder), d.scenes) for d in found.values()] == [
         ("a", "/data/with blank/a", 3),
         ("b", "/data/b", 11),
@@ -142,11 +187,11 @@ def test_a_text_that_is_no_yaml_is_an_error_with_its_file(tmp_path, text, messag
     file = tmp_path / "text.yaml"
     file.write_text(text)
     with pytest.raises(ConfigError, match="text.yaml: ") as error:
-        config.read_yaml(file)
+        read_yaml(file)
     assert message in str(error.value)
 
 
 def test_bytes_that_are_no_text_are_an_error(tmp_path):
     (tmp_path / "text.yaml").write_bytes(b"a: \xff")
     with pytest.raises(ConfigError, match="text.yaml: .*can't decode"):
-        config.read_yaml(tmp_path / "text.yaml")
+        read_yaml(tmp_path / "text.yaml")

@@ -7,10 +7,11 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, convergence, summary
-from sgf_paper.config import ConfigError, Dataset
+from sgf_paper import config, convergence, paths, summary
+from sgf_paper.stereo_datasets import Dataset
+from sgf_paper.strict_yaml import ConfigError
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "convergence.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "convergence.yaml").read_text())
 FIELDS = (
     "case,motion,levels,unit,start,column,residual,epsilon,compared,points,converged,converged_pct,"
     "converged_low_pct,converged_high_pct,own_median_px,own_low_px,own_high_px,common,"
@@ -66,6 +67,7 @@ def test_tracks_are_of_the_first_image_set_at_hand(study, tmp_path):
     [
         ({"drawn": ["photo", "sbd"]}, r"drawn: no column \['sbd'\]"),
         ({"image_sets": NODE["image_sets"][:1]}, "the last one must need no data set"),
+        ({"image_sets": []}, "the last one must need no data set"),
         ({"columns": {"photo": {"metric": "photo"}}}, "columns.photo: unknown key 'metric'"),
     ],
 )

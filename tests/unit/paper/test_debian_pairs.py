@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sgf_paper import config, images
+from sgf_paper import images, paths
 
-SCRIPT = config.PROJECT / "datasets" / "debian_pairs.py"
+SCRIPT = paths.PROJECT / "datasets" / "debian_pairs.py"
 SKIMAGE = "usr/lib/python3/dist-packages/skimage/data"
 OPENCV_DOC = "usr/share/doc/opencv-doc/examples/data"
 

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from sgf_paper import config, deviations
-from sgf_paper.config import ConfigError
+from sgf_paper import config, deviations, paths
+from sgf_paper.strict_yaml import ConfigError, read_yaml
 
 DOCUMENT = """# Deviations
 
@@ -76,9 +76,9 @@ def test_a_key_without_an_entry_is_named(document):
 
 def columns_of(group):
     """Columns of a sweep or an experiment; none where it has none."""
-    if (config.SWEEPS / f"{group}.yaml").exists():
-        return set(config.read_yaml(config.SWEEPS / f"{group}.yaml")["columns"])
-    return set(config.read_yaml(config.EXPERIMENTS / f"{group}.yaml").get("columns", ()))
+    if (paths.SWEEPS / f"{group}.yaml").exists():
+        return set(read_yaml(paths.SWEEPS / f"{group}.yaml")["columns"])
+    return set(read_yaml(paths.EXPERIMENTS / f"{group}.yaml").get("columns", ()))
 
 
 def test_the_projects_rows_are_columns_and_every_entry_is_referred_to():
@@ -90,7 +90,7 @@ def test_the_projects_rows_are_columns_and_every_entry_is_referred_to():
 
 
 def test_all_anchors_of_the_document_are_unique():
-    anchors = re.findall(r'<a id="([^"]*)"', config.DEVIATIONS_TEXT.read_text())
+    anchors = re.findall(r'<a id="([^"]*)"', paths.DEVIATIONS_TEXT.read_text())
     assert len(anchors) == len(set(anchors)) == len(deviations.load_deviations().numbers)
 
 

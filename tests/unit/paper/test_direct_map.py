@@ -9,10 +9,11 @@ import yaml
 from matplotlib import pyplot
 
 from conftest import STEP, TIMES_S, TURN, way
-from sgf_paper import config, direct_map, summary
-from sgf_paper.config import ConfigError, OffSurface
+from sgf_paper import config, direct_map, paths, summary
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.tracking_config import OffSurface
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "fig6.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "fig6.yaml").read_text())
 SURFACE = OffSurface(far_m=0.1, doubled_m=[0.05, 0.3], cell_m=0.5, cell_points=20)
 VERTEX = np.dtype([*((name, "<f4") for name in ("x", "y", "z", "variance")), ("support", "<i4")])
 SCORES = {"path_m": 1.5, "scale": 2.0, "ate_rmse_m": 0.0123}

@@ -6,8 +6,9 @@ import pandas as pd
 import pytest
 
 from sgf_paper import config, external
-from sgf_paper.config import ConfigError, ExternalSystem
 from sgf_paper.external import ExternalError
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.tracking_config import ExternalSystem, load_external_system
 
 FIRST_NS = 1_403_636_579_763_555_584  # of EuRoC's MH_01; no double is equal to it
 STEP_NS = 50_000_000
@@ -92,12 +93,12 @@ def test_a_file_without_poses_is_a_mistake(write):
 )
 def test_how_a_system_is_scored_stands_in_its_folder(write, settings, message):
     folder = write("").parent
-    assert config.load_external_system(folder) == ExternalSystem("body", "se3")
+    assert load_external_system(folder) == ExternalSystem("body", "se3")
     write("{align: sim3, frame: camera}", "slam/align.yaml")
-    assert config.load_external_system(folder) == ExternalSystem("camera", "sim3")
+    assert load_external_system(folder) == ExternalSystem("camera", "sim3")
     write(settings, "slam/align.yaml")
     with pytest.raises(ConfigError, match=f"align.yaml: {message}"):
-        config.load_external_system(folder)
+        load_external_system(folder)
 
 
 def test_files_are_found_by_system_and_sequence_and_names_are_checked(joined, write, tmp_path):

@@ -7,11 +7,11 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, deviations, joined_table, summary
-from sgf_paper.config import ConfigError
+from sgf_paper import config, deviations, joined_table, paths, summary
+from sgf_paper.strict_yaml import ConfigError
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "table3.yaml").read_text())
-REFERENCE = config.PROJECT / "results" / "reference"
+NODE = yaml.safe_load((paths.EXPERIMENTS / "table3.yaml").read_text())
+REFERENCE = paths.PROJECT / "results" / "reference"
 EXTERNAL = ["okvis", "slam"]
 
 
@@ -23,27 +23,29 @@ def joined():
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"parts": {"a": "odometry"}}, "parts: odometry is no trajectory_table"),
+        ({"parts": {"a": "odometry"}}, "parts.a: odometry is no trajectory_table"),
+        ({"parts": {"a": ["table3_dso"]}}, "parts.a: expected str, found"),
+        ({"parts": {}}, "parts: there are none"),
         ({"published": ["okvis", "vins"]}, r"published: the paper has no row \['vins'\]"),
         ({"parts": {"a": "gone"}}, "gone.yaml: cannot be read"),
     ],
 )
 def test_mistakes_are_named(monkeypatch, tmp_path, change, message):
-    for path in config.EXPERIMENTS.glob("*.yaml"):
+    for path in paths.EXPERIMENTS.glob("*.yaml"):
         (tmp_path / path.name).write_text(path.read_text())
-    monkeypatch.setattr(config, "EXPERIMENTS", tmp_path)
+    monkeypatch.setattr(paths, "EXPERIMENTS", tmp_path)
     (tmp_path / "bad.yaml").write_text(yaml.safe_dump({**NODE, **change}))
     with pytest.raises(ConfigError, match=message):
         config.load_experiment("bad")
 
 
 def test_parts_have_one_rule_of_failure(monkeypatch, tmp_path):
-    for path in config.EXPERIMENTS.glob("table3*.yaml"):
+    for path in paths.EXPERIMENTS.glob("table3*.yaml"):
         (tmp_path / path.name).write_text(
             path.read_text().replace("lost_below_pct: 95", "lost_below_pct: 90", 1)
         )
-    (tmp_path / "table3_dso.yaml").write_text((config.EXPERIMENTS / "table3_dso.yaml").read_text())
-    monkeypatch.setattr(config, "EXPERIMENTS", tmp_path)
+    (tmp_path / "table3_dso.yaml").write_text((paths.EXPERIMENTS / "table3_dso.yaml").read_text())
+    monkeypatch.setattr(paths, "EXPERIMENTS", tmp_path)
     with pytest.raises(ConfigError, match="lost_below_pct of table3_vio differs from that of table3_dso"):
         config.load_experiment("table3")
 

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from conftest import mean_error
-from sgf_paper import config, light_change, summary
-from sgf_paper.config import ConfigError, LightChange
+from sgf_paper import config, light_change, paths, summary
+from sgf_paper.stereo_config import LightChange
+from sgf_paper.strict_yaml import ConfigError
 
 
 @pytest.fixture
@@ -154,9 +155,9 @@ def test_files_and_summary(experiment, table, raw, datasets, tmp_path, monkeypat
 
 
 def test_columns_must_be_in_every_sweep_of_the_table(tmp_path, monkeypatch):
-    real = (config.EXPERIMENTS / "light_change.yaml").read_text()
-    table = (config.EXPERIMENTS / "table1.yaml").read_text()
-    monkeypatch.setattr(config, "EXPERIMENTS", tmp_path)
+    real = (paths.EXPERIMENTS / "light_change.yaml").read_text()
+    table = (paths.EXPERIMENTS / "table1.yaml").read_text()
+    monkeypatch.setattr(paths, "EXPERIMENTS", tmp_path)
     (tmp_path / "table1.yaml").write_text(table)
     (tmp_path / "light_change.yaml").write_text(real.replace("census]", "ugf]"))
     with pytest.raises(ConfigError, match="no column .'ugf'. in sweep stereo_mesh"):

@@ -10,10 +10,10 @@ import yaml
 from matplotlib import pyplot
 
 from conftest import STEP, TIMES_S, TURN, way
-from sgf_paper import config, map_view, mrpt_map, summary
-from sgf_paper.config import ConfigError
+from sgf_paper import config, map_view, mrpt_map, paths, summary
+from sgf_paper.strict_yaml import ConfigError
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "mrpt_map.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "mrpt_map.yaml").read_text())
 POINTS = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, 3]])
 REPORT = "frames: 22, with pose: 21, lost: 1, restarts: 0, key-frames: 4\ngaps over 1 s: 0\n"
 

@@ -11,10 +11,10 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, odometry, odometry_scores, repeated_runs, run, summary, text
-from sgf_paper.config import ConfigError
+from sgf_paper import config, odometry, odometry_scores, paths, repeated_runs, run, summary, text
+from sgf_paper.strict_yaml import ConfigError
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "odometry.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "odometry.yaml").read_text())
 RENDERED = ["V1_03_difficult", "MH_03_medium"]
 # ATE in mm of three runs, lost where infinite: undisturbed and under light.
 ATE_MM = {
@@ -40,6 +40,10 @@ def study(experiments):
         ({"compared": ["sgf", "sbd"]}, r"compared: no column \['sbd'\]"),
         ({"baselines": ["sbd"]}, r"baselines: no column \['sbd'\]"),
         ({"runs": 0}, "runs is 0; it has to be positive"),
+        ({"runs": "two"}, "bad.yaml: runs: expected int, found 'two'"),
+        ({"runs": True}, "bad.yaml: runs: expected int, found True"),
+        ({"conditions": {}}, "the first one must change nothing"),
+        ({"conditions": {"light": 2}}, "conditions.light: expected a map, found 2"),
         ({"first_frames": 0}, "first_frames is 0; it has to be positive"),
         ({"first_frames": 9}, "first_frames is 9; a verdict takes 10 runs that begin at different ones"),
         ({"conditions": {"light": {"gamma": 2}}}, "the first one must change nothing"),

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sgf_paper import config, record
+from sgf_paper import paths, record
 
 PROGRAM = """#!/usr/bin/python3
 import pathlib, sys
@@ -28,7 +28,7 @@ def start(tmp_path):
     """Starts the recorder in a folder of its own."""
 
     def start(*words):
-        environment = {**os.environ, "PYTHONPATH": str(config.PAPER)}
+        environment = {**os.environ, "PYTHONPATH": str(paths.PAPER)}
         command = [sys.executable, "-m", "sgf_paper.record", *map(str, words)]
         return subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
 

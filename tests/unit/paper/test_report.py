@@ -10,9 +10,22 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from sgf_paper import claims, comparison, config, deviations, joined_table, report, report_grid, style, summary, text
-from sgf_paper.config import ReportTable
+from sgf_paper import (
+    claims,
+    comparison,
+    config,
+    deviations,
+    joined_table,
+    paths,
+    published_values,
+    report,
+    report_grid,
+    style,
+    summary,
+    text,
+)
 from sgf_paper.deviations import Notes
+from sgf_paper.report_config import ReportTable, load_claims
 from sgf_paper.style import plt
 
 REPORT = config.load_experiment("report")
@@ -31,7 +44,7 @@ def make_results(root):
     tables, figures = root / "tables", root / "figures"
     for folder in (tables, figures, root / "raw" / "stereo_bm" / "debian_pairs"):
         folder.mkdir(parents=True)
-    for path in config.REFERENCE.glob("*.csv"):
+    for path in paths.REFERENCE.glob("*.csv"):
         if any(path.stem.startswith(name) for name in MADE) and not path.stem.startswith("table3_vio"):
             shutil.copy(path, tables)
     lines = pd.read_csv(tables / "table1_scenes.csv")
@@ -149,7 +162,7 @@ def test_each_claim_has_a_verdict_and_the_number_that_says_so(made):
     }  # fmt: skip
     assert "middlebury2014_q, sgf / orig: 0.52 [0.46, 0.60], 14 won, 1 lost, 0 tied of 15: better" in page
     verdicts = pd.read_csv(results / "tables" / "report_verdicts.csv")
-    assert len(verdicts[verdicts["chapter"] == "claims"]) == len(config.load_claims().claims)
+    assert len(verdicts[verdicts["chapter"] == "claims"]) == len(load_claims().claims)
     assert verdicts.notna().all().all()
 
 
@@ -234,7 +247,7 @@ def test_ratios_claims_and_counts_link_to_what_they_are_of(page):
     assert re.search(r'<td><a href="tables/table1_scenes.csv">0\.\d+</a></td>', pairs_of)
     assert '<a href="tables/table1_scenes.csv">1/2</a>' in page, "scenes won"
     claim = page.split('<article id="fig3_stronger_edges">')[1].split("</article>")[0]
-    lines = pd.read_csv(config.REFERENCE / "fig3.csv")
+    lines = pd.read_csv(paths.REFERENCE / "fig3.csv")
     chosen = lines[(lines["case"] == "search") & (lines["column"] == "ngf")]
     assert f'<a href="reference/fig3.csv">fig3</a>, line {chosen.index[0] + 2}</td>' in claim
 
@@ -246,13 +259,13 @@ def test_measured_values_of_the_paper_link_to_their_scores(earlier):
 
 def test_the_document_has_the_reasons_of_tolerances(earlier):
     document = (earlier[0] / "report" / "values.tex").read_text()
-    for entry in config.load_comparisons().values():
+    for entry in published_values.load_comparisons().values():
         for tolerance in entry.tolerances:
             assert text._latex_prose(tolerance.reason) in document
 
 
 def test_failed_runs_are_shown(page):
-    runs = pd.read_csv(config.REFERENCE / "table3_dso_runs.csv")
+    runs = pd.read_csv(paths.REFERENCE / "table3_dso_runs.csv")
     assert runs["failed"].any()
     shown = page[page.index('id="sequence-MH_01_easy"') :]
     assert "∞" in shown

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sgf_paper import bench, config, density, disparity_figure, images, progress, style
-from sgf_paper.config import Column, Density, FigureScene, Parameters
+from sgf_paper import bench, density, disparity_figure, images, progress, style
+from sgf_paper.stereo_config import Column, Density, FigureScene, Parameters, load_sweep
 
 
 @pytest.fixture
@@ -197,7 +197,7 @@ def test_wide_images_stand_above_the_matchers_rows_on_one_colour_scale(width, gr
 
 
 def test_every_column_has_its_own_line():
-    sweep = config.load_sweep("stereo_bm")  # of those with curves the one with most columns
+    sweep = load_sweep("stereo_bm")  # of those with curves the one with most columns
     extra = [name for name in sweep.columns if name not in sweep.main_columns]
     styles = [tuple(sorted(map(str, style.line_style(c, extra).items()))) for c in sweep.columns]
     assert len(set(styles)) == len(sweep.columns)

@@ -8,10 +8,11 @@ import pytest
 import yaml
 from PIL import Image
 
-from sgf_paper import config, self_match, summary
-from sgf_paper.config import ConfigError, Frame
+from sgf_paper import config, paths, self_match, summary
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.study_config import Frame, load_published_errors
 
-FIG1 = yaml.safe_load((config.EXPERIMENTS / "fig1.yaml").read_text())
+FIG1 = yaml.safe_load((paths.EXPERIMENTS / "fig1.yaml").read_text())
 HEADER = (
     "image,change,value,column,first_disparity,end_disparity,pixels,mean_px,first_px,median_px,"
     "bad1_pct,ties_pct\n"
@@ -139,7 +140,7 @@ def test_the_figure_shows_images_and_errors_with_their_means(figure, raw):
 
 
 def test_columns_are_the_papers_in_its_order():
-    published = config.load_published_errors(config.load_experiment("fig1"))
+    published = load_published_errors(config.load_experiment("fig1"))
     columns = [name for name, c in config.load_experiment("fig1").columns.items() if not c.extra]
     assert columns == list(published)
 
@@ -151,7 +152,7 @@ def test_columns_are_the_papers_in_its_order():
         ({"figure_columns": ["sgf", "sdf"]}, r"figure_columns: no column \['sdf'\]"),
         ({"published_group": "nobody"}, r"no group \['nobody'\]"),
         ({"columns": {"sgf": {"metrics": "sgf"}}}, "columns.sgf: unknown key 'metrics'"),
-        ({"groups": [{"name": "a", "title": "A"}]}, "groups: key 'frames' is missing"),
+        ({"groups": [{"name": "a", "title": "A"}]}, r"groups\[0\]: key 'frames' is missing"),
     ],
 )
 def test_mistakes_are_named(experiments, changes, message):
@@ -163,4 +164,4 @@ def test_mistakes_are_named(experiments, changes, message):
 def test_an_unknown_published_entry_is_an_error(figure):
     figure.published = "figure_9"
     with pytest.raises(ConfigError, match="no entry figure_9"):
-        config.load_published_errors(figure)
+        load_published_errors(figure)

@@ -6,8 +6,9 @@ import pytest
 import yaml
 
 from sgf_paper import config, semi_dense_figure, summary
-from sgf_paper.config import ConfigError, SemiDenseRow
 from sgf_paper.semi_dense_figure import Frame, PlyError
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.study_config import SemiDenseRow
 
 HEADER = (
     "ply\nformat binary_little_endian 1.0\nelement vertex {}\n"
@@ -190,5 +191,5 @@ def test_a_bound_that_is_missing_is_named(experiments):
 def test_rows_that_lead_nowhere_are_named(experiments, key, value):
     rows = [{**FIGURE["rows"][0], key: value}]
     (experiments / "bad.yaml").write_text(yaml.safe_dump({**FIGURE, "rows": rows}))
-    with pytest.raises(ConfigError, match=f"bad.yaml: rows: .*{key}"):
+    with pytest.raises(ConfigError, match=rf"bad.yaml: rows\[0\]: .*{key}"):
         config.load_experiment("bad")

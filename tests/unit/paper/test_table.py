@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from sgf_paper import report_grid, scores, text
-from sgf_paper.config import Column, Parameters
 from sgf_paper.deviations import Notes
 from sgf_paper.scores import ScoresError
+from sgf_paper.stereo_config import Column, Parameters
 from sgf_paper.table import (
     CHOICE_COLUMNS,
     CSV_COLUMNS,

@@ -7,14 +7,15 @@ from pathlib import Path
 import pytest
 import yaml
 
-from sgf_paper import config, summary, tracking_tuning, tuning_report
-from sgf_paper.config import ConfigError, SearchRange
+from sgf_paper import config, paths, summary, tracking_tuning, tuning_report
+from sgf_paper.strict_yaml import ConfigError, read_yaml
+from sgf_paper.tracking_config import SearchRange, load_tuned
 from sgf_paper.tracking_tuning import Tracker, TuningError
 
-TABLE = yaml.safe_load((config.EXPERIMENTS / "table3_vio.yaml").read_text())
-NODE = yaml.safe_load((config.EXPERIMENTS / "tune.yaml").read_text())
-TINY = yaml.safe_load((config.EXPERIMENTS / "tune_tiny.yaml").read_text())
-REVIEWED = sorted(path.stem for path in (config.EXPERIMENTS / "tuned").glob("*.yaml"))
+TABLE = yaml.safe_load((paths.EXPERIMENTS / "table3_vio.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "tune.yaml").read_text())
+TINY = yaml.safe_load((paths.EXPERIMENTS / "tune_tiny.yaml").read_text())
+REVIEWED = sorted(path.stem for path in (paths.EXPERIMENTS / "tuned").glob("*.yaml"))
 DEFAULTS = {"flow.max_backward_px": 0.5, "flow.max_iterations": 5}
 NOTED = """options:
   flow: {max_backward_px: 0.5, max_iterations: 5}
@@ -113,6 +114,9 @@ def error_of(options):
         ({"space": {"a": {"low": 2, "high": 1}}}, "space.a: no range from 2 to 1"),
         ({"space": {"a": {"low": 0, "high": 1, "log": True}}}, "space.a: no range from 0 to 1"),
         ({"budget": {**NODE["budget"], "trials": 0}}, "budget: trials is 0; it has to be positive"),
+        ({"space": {"a": {"low": "1e-3", "high": 1}}}, "space.a.low: expected float, found '1e-3'"),
+        ({"table": 3}, "table: expected str, found 3"),
+        ({"table": "tune"}, "table: tune is no trajectory_table"),
     ],
 )
 def test_mistakes_are_named(write, change, message):
@@ -266,13 +270,13 @@ def test_what_is_missing_or_of_something_else_is_an_error(tuned_table):
     with pytest.raises(ConfigError, match=r"tuned/ngv.yaml: is missing; `./reproduce.sh --only tune` makes"):
         table.options("MH_01_easy", Path(), "light", "ngv")
     with pytest.raises(ConfigError, match="holds options of sgf_vio, not of sgf_direct"):
-        config.load_tuned("sgf3", "sgf_direct", "MH_01_easy")
+        load_tuned("sgf3", "sgf_direct", "MH_01_easy")
     with pytest.raises(ConfigError, match="has no options found without V9"):
-        config.load_tuned("sgf3", "sgf_vio", "V9")
+        load_tuned("sgf3", "sgf_vio", "V9")
     document["folds"][0]["trained_on"].append("MH_01_easy")
     (folder / "sgf3.yaml").write_text(yaml.safe_dump(document))
     with pytest.raises(ConfigError, match="has no options found without MH_01_easy"):
-        config.load_tuned("sgf3", "sgf_vio", "MH_01_easy")
+        load_tuned("sgf3", "sgf_vio", "MH_01_easy")
 
 
 def test_columns_are_tuned_from_their_own_options(tuned_table):
@@ -295,7 +299,7 @@ def test_tables_show_both_folds_and_the_defaults(tuned_table, experiments, write
 
 @pytest.mark.parametrize("column", REVIEWED)
 def test_what_is_committed_is_of_the_experiment_as_it_is(column):
-    document = config.read_yaml(config.EXPERIMENTS / "tuned" / f"{column}.yaml")
+    document = read_yaml(paths.EXPERIMENTS / "tuned" / f"{column}.yaml")
     tuning = config.load_experiment("tune")
     assert document["column"] == column and document["program"] == tuning.table.program(column)
     assert [fold["used_for"] for fold in document["folds"]] == tuning.folds

@@ -10,10 +10,11 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from sgf_paper import config, odometry_scores, summary, trajectory_table
-from sgf_paper.config import ConfigError
+from sgf_paper import config, odometry_scores, paths, summary, trajectory_table
+from sgf_paper.strict_yaml import ConfigError
+from sgf_paper.tracking_config import TrackingColumn, TrackingProgram, load_published_trajectories
 
-NODE = yaml.safe_load((config.EXPERIMENTS / "table3_dso.yaml").read_text())
+NODE = yaml.safe_load((paths.EXPERIMENTS / "table3_dso.yaml").read_text())
 RENDERED = ["MH_01_easy", "MH_03_medium", "V1_02_medium", "V1_03_difficult"]
 # Of four runs on a path of 2 m: ATE RMSE in m (infinite: lost), and success by sgf_eval's two rules.
 RUNS = {
@@ -55,7 +56,7 @@ def test_mistakes_are_named(experiments, change, message):
 
 def test_the_papers_ten_sequences_and_v2_03_are_there():
     table = config.load_experiment("table3_dso")
-    published = config.load_published_trajectories(table)
+    published = load_published_trajectories(table)
     labels = [sequence.published for sequence in table.sequences.values() if sequence.published]
     assert [*labels[:-1], "avg"] == list(published["photo"]) == list(published["sgf"])
     assert labels[-1] == "V23" and published["ngv_motion"] == {}
@@ -63,9 +64,9 @@ def test_the_papers_ten_sequences_and_v2_03_are_there():
 
 
 def test_an_unknown_row_of_the_paper_is_an_error(study):
-    study.columns["sgf"] = config.TrackingColumn("sgf_direct", published="dso_sbd")
+    study.columns["sgf"] = TrackingColumn("sgf_direct", published="dso_sbd")
     with pytest.raises(ConfigError, match=r"no entry table_3_euroc_ate_m.\['dso_sbd'\]"):
-        config.load_published_trajectories(study)
+        load_published_trajectories(study)
 
 
 @pytest.mark.parametrize(
@@ -99,8 +100,8 @@ def test_rendered_sequences_are_calibrated_unless_the_light_changes(study):
 
 
 def test_a_program_that_takes_no_calibration_gets_none(study):
-    study.programs["sgf_vio"] = config.TrackingProgram(frame="body", align="se3")
-    study.columns["vio"] = config.TrackingColumn("sgf_vio")
+    study.programs["sgf_vio"] = TrackingProgram(frame="body", align="se3")
+    study.columns["vio"] = TrackingColumn("sgf_vio")
     assert "--photometric" not in flags_of(study, "MH_01_easy", "undisturbed", "vio")
     assert study.program("vio") == "sgf_vio"
     assert study.score_flags("vio") == ["--frame", "body", "--align", "se3"]

@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from sgf_paper import config
-from sgf_paper.config import Parameters, Tuning
 from sgf_paper.scores import ERRORS, curve, interpolate
+from sgf_paper.stereo_config import Parameters, Tuning
 from sgf_paper.tuning import assign_folds, choose
 
 
