@@ -23,6 +23,7 @@ ImuBias BiasOf(const BodyState& state) { return {state.gyro_bias, state.accel_bi
 void CheckOptions(const VioOptions& options) {
   flow::CheckOptions(options.flow);
   CheckOptions(options.window);
+  CheckOptions(options.start);
   const auto require = [](bool valid, const char* option, double value, const char* range) {
     if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
   };
