@@ -109,6 +109,8 @@ void CheckOptions(const DirectOptions& options) {
           "positive");
   require(options.keyframe_brightness > 0, "keyframe_brightness", options.keyframe_brightness,
           "positive");
+  require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
+          options.keyframe_inliers, "in [0, 1]");
   require(options.lost_frames >= 1, "lost_frames", options.lost_frames, "positive");
   require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
