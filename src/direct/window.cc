@@ -110,26 +110,14 @@ class WindowOptimizer::Engine {
     bool Evaluate(double const* const* parameters, double* residuals,
                   double** jacobians) const override {
       engine_.MoveTo(window_, parameters);
-      Eigen::Map<VectorXd> r(residuals, num_residuals());
-      r.setZero();
-      const bool linearize = jacobians != nullptr;
-      const double cost = engine_.Evaluate(window_, linearize);
-      if (!linearize) {
-        r(0) = std::sqrt(2 * cost);
+      const double cost = engine_.Evaluate(window_, jacobians != nullptr);
+      if (!jacobians) {
+        std::fill_n(residuals, num_residuals(), 0.);
+        residuals[0] = std::sqrt(2 * cost);
         return std::isfinite(cost);
       }
       const Reduced reduced = engine_.Reduce(window_);
-      const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
-      r.head(root.e.size()) = root.e;
-      r(r.size() - 1) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
-      for (size_t k = 0; k < engine_.Blocks(window_); ++k) {
-        if (!jacobians[k]) continue;
-        using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
-        Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), kFrameParameters);
-        J.setZero();
-        J.topRows(root.S.rows()) =
-            root.S.middleCols<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
-      }
+      EvaluateReduced(cost, reduced.H, reduced.b, parameter_block_sizes(), residuals, jacobians);
       return std::isfinite(cost);
     }
 

@@ -24,11 +24,10 @@ bool VisualCost::Evaluate(double const* const* parameters, double* residuals,
   for (size_t k = 0; k < blocks.size(); column += blocks[k++].size())
     std::copy_n(parameters[k], blocks[k].size(), at_.x().data() + column);
   Settle();
-  Eigen::Map<VectorXd> r(residuals, num_residuals());
-  r.setZero();
   if (!jacobians) {
-    r(n) = std::sqrt(2 * equations_.Cost(at_.poses(), items_));
-    return std::isfinite(r(n));
+    std::fill_n(residuals, n, 0.);
+    residuals[n] = std::sqrt(2 * equations_.Cost(at_.poses(), items_));
+    return std::isfinite(residuals[n]);
   }
   ReducedEquations reduced;
   const double cost = equations_.Linearize(at_.poses(), items_, reduced);
@@ -39,17 +38,7 @@ bool VisualCost::Evaluate(double const* const* parameters, double* residuals,
   }
   linear_x_ = Parameters();
   linearized_ = true;
-  const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
-  r.head(root.e.size()) = root.e;
-  r(n) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
-  column = 0;
-  for (size_t k = 0; k < blocks.size(); column += blocks[k++].size()) {
-    if (!jacobians[k]) continue;
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), blocks[k].size());
-    J.setZero();
-    J.topRows(root.S.rows()) = root.S.middleCols(column, blocks[k].size());
-  }
+  EvaluateReduced(cost, reduced.H, reduced.b, parameter_block_sizes(), residuals, jacobians);
   return std::isfinite(cost);
 }
 
@@ -101,17 +90,7 @@ PriorCost::PriorCost(const SquareRootPrior& prior) : prior_(prior) {
 
 bool PriorCost::Evaluate(double const* const* parameters, double* residuals,
                          double** jacobians) const {
-  Eigen::Map<VectorXd> r(residuals, num_residuals());
-  r = prior_.e();
-  Index column = 0;
-  for (size_t k = 0; k < prior_.blocks().size(); ++k) {
-    const int size = prior_.blocks()[k].size();
-    const auto S = prior_.S().middleCols(column, size);
-    r += S * Eigen::Map<const VectorXd>(parameters[k], size);
-    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-    if (jacobians && jacobians[k]) Eigen::Map<RowMajor>(jacobians[k], num_residuals(), size) = S;
-    column += size;
-  }
+  EvaluateRows(prior_.S(), prior_.e(), parameter_block_sizes(), parameters, residuals, jacobians);
   return true;
 }
 
