@@ -7,6 +7,7 @@
 #include <sgf/alignment/warp.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 #include <sgf/core/stopwatch.h>
 #include <sgf/direct/activation.h>
 #include <sgf/direct/direct_odometry.h>
@@ -47,27 +48,23 @@ void CheckOptions(const DirectOptions& options) {
   CheckOptions(options.tracking);
   CheckOptions(options.window);
   CheckOptions(options.initializer);
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
   if (options.tracking.residual == "bit_planes")
     throw Error("tracking.residual", "'bit_planes' has no window to go with it");
   if (options.tracking.residual == "lssd" && options.tracking.pattern == alignment::Pattern::kPoint)
     throw Error("tracking.residual", "'lssd' is constant over patches of one pixel");
-  require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
-  require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
-  require(options.keyframes >= options.min_keyframes && options.keyframes <= kMostKeyframes,
-          "keyframes", options.keyframes,
-          fmt::format("from min_keyframes to {}", kMostKeyframes).c_str());
-  require(options.keyframe_flow > 0, "keyframe_flow", options.keyframe_flow, "positive");
-  require(options.keyframe_parallax > 0, "keyframe_parallax", options.keyframe_parallax,
+  Require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
+  Require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
+  Require(options.keyframes >= options.min_keyframes && options.keyframes <= kMostKeyframes,
+          "keyframes", options.keyframes, fmt::format("from min_keyframes to {}", kMostKeyframes));
+  Require(options.keyframe_flow > 0, "keyframe_flow", options.keyframe_flow, "positive");
+  Require(options.keyframe_parallax > 0, "keyframe_parallax", options.keyframe_parallax,
           "positive");
-  require(options.keyframe_brightness > 0, "keyframe_brightness", options.keyframe_brightness,
+  Require(options.keyframe_brightness > 0, "keyframe_brightness", options.keyframe_brightness,
           "positive");
-  require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
+  Require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
           options.keyframe_inliers, "in [0, 1]");
-  require(options.lost_frames >= 1, "lost_frames", options.lost_frames, "positive");
-  require(options.threads >= 0, "threads", options.threads, "at least 0");
+  Require(options.lost_frames >= 1, "lost_frames", options.lost_frames, "positive");
+  Require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
 class DirectOdometry::Impl {

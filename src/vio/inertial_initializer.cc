@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/vio/inertial_initializer.h>
 
 namespace sgf::vio {
@@ -321,9 +322,6 @@ void SolveMotion(std::span<const TimedPose> poses, std::span<const Preintegratio
 }  // namespace
 
 void CheckOptions(const InertialInitializerOptions& options) {
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
   for (const auto& [name, value] :
        {std::pair("start.gravity", options.gravity),
         std::pair("start.min_rest_s", options.min_rest_s),
@@ -335,8 +333,8 @@ void CheckOptions(const InertialInitializerOptions& options) {
         std::pair("start.accel_bias_sd", options.accel_bias_sd),
         std::pair("start.max_tilt_sd_rad", options.max_tilt_sd_rad),
         std::pair("start.max_motion_error", options.max_motion_error)})
-    require(value > 0 && std::isfinite(value), name, value, "finite and positive");
-  require(options.min_poses >= 4, "start.min_poses", options.min_poses, "at least 4");
+    Require(value > 0 && std::isfinite(value), name, value, "finite and positive");
+  Require(options.min_poses >= 4, "start.min_poses", options.min_poses, "at least 4");
 }
 
 std::span<const std::pair<const char*, Problem>> EnumNames(Problem) {

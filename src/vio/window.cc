@@ -2,9 +2,8 @@
 #include <utility>
 
 #include <ceres/ceres.h>
-#include <fmt/core.h>
 
-#include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/vio/window.h>
 #include <sgf/vio/window_costs.h>
 
@@ -30,15 +29,12 @@ ceres::Solver::Options SolverOptions(const WindowOptions& window) {
 }  // namespace
 
 void CheckOptions(const WindowOptions& options) {
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
-  require(options.max_iterations >= 1, "window.max_iterations", options.max_iterations, "positive");
-  require(options.sigma_px > 0, "window.sigma_px", options.sigma_px, "positive");
-  require(options.huber_sigmas > 0, "window.huber_sigmas", options.huber_sigmas, "positive");
-  require(options.outlier_px > 0, "window.outlier_px", options.outlier_px, "positive");
-  require(options.tolerance >= 0, "window.tolerance", options.tolerance, "at least 0");
-  require(options.gravity > 0, "window.gravity", options.gravity, "positive");
+  Require(options.max_iterations >= 1, "window.max_iterations", options.max_iterations, "positive");
+  Require(options.sigma_px > 0, "window.sigma_px", options.sigma_px, "positive");
+  Require(options.huber_sigmas > 0, "window.huber_sigmas", options.huber_sigmas, "positive");
+  Require(options.outlier_px > 0, "window.outlier_px", options.outlier_px, "positive");
+  Require(options.tolerance >= 0, "window.tolerance", options.tolerance, "at least 0");
+  Require(options.gravity > 0, "window.gravity", options.gravity, "positive");
 }
 
 Window::Window(const VioRig& rig, const WindowOptions& options, int threads)
