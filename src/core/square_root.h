@@ -9,11 +9,12 @@ namespace sgf {
 /// x^T H x / 2 + b^T x as least squares, |S x + e|^2 / 2 up to a constant: S has a row for each
 /// direction that anything is known of.
 struct SquareRoot {
-  Eigen::MatrixXd S;
-  Eigen::VectorXd e;
+  Eigen::MatrixXd S;  ///< r x n for n parameters, r <= n
+  Eigen::VectorXd e;  ///< r
 };
 
-/// @param H symmetric, without negative eigenvalues but for rounding.
+/// @param H n x n, symmetric, without negative eigenvalues but for rounding. @param b n.
+/// @return nothing at all (0 x 0) for n = 0.
 SquareRoot SquareRootOf(const Eigen::MatrixXd& H, const Eigen::VectorXd& b);
 
 /// S x + e where the parameters come in blocks, in the form in which Ceres asks for it.

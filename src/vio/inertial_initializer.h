@@ -18,15 +18,15 @@ namespace sgf::vio {
 /// Why a body's first states are not known, or not believed.
 enum class InitialisationProblem {
   kNone,
-  kTooLittleData,
-  kGapInData,
-  kMoving,
-  kGyroscopeInDegrees,
-  kSensorAxes,
-  kGyroscopeBias,
-  kAccelerationInG,
-  kGravityMagnitude,
-  kMotionDisagrees
+  kTooLittleData,       ///< or too little motion in it for gravity and biases to be told apart
+  kGapInData,           ///< no measurements, or not all, of the time of the poses
+  kMoving,              ///< where rest was expected
+  kGyroscopeInDegrees,  ///< rates are about 180/pi times those of the poses
+  kSensorAxes,          ///< rotations do not fit those of the poses, whatever the bias
+  kGyroscopeBias,       ///< larger than max_gyro_bias
+  kAccelerationInG,     ///< gravity is about 1 where m/s^2 are expected
+  kGravityMagnitude,    ///< off by more than a tenth
+  kMotionDisagrees      ///< acceleration does not fit the motion of the poses
 };
 
 std::span<const std::pair<const char*, InitialisationProblem>> EnumNames(InitialisationProblem);
