@@ -11,6 +11,7 @@
 #include <sgf/alignment/residual_table.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 
 namespace sgf::alignment {
 namespace {
@@ -382,20 +383,12 @@ class DirectAligner::EngineOf : public Engine {
   std::span<const Eigen::Vector2f> offsets_;
 };
 
-namespace {
-
-void Require(bool valid, const char* option, double value, const char* range) {
-  if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-}
-
-}  // namespace
-
 void CheckOptions(const AlignmentOptions& options) {
   const ResidualInfo& residual = FindResidual(options.residual);
   if (options.linearization == Linearization::kInverse && !residual.inverse_compositional)
     throw Error("linearization",
                 fmt::format("'{}' cannot be linearised at the reference", options.residual));
-  Require(options.levels >= 1 && options.levels <= 10, "levels", options.levels, "1 to 10");
+  Require(options.levels >= 1 && options.levels <= 10, "levels", options.levels, "from 1 to 10");
   Require(options.smallest_side_px >= 8, "smallest_side_px", options.smallest_side_px,
           "at least 8");
   Require(options.solver.max_iterations >= 1, "max_iterations", options.solver.max_iterations,
@@ -461,8 +454,7 @@ std::shared_ptr<const DirectAligner::Reference> DirectAligner::MakeReference(
 
 AlignmentResult DirectAligner::Align(const Reference& reference, const Pyramid& current,
                                      const SE3& guess, std::optional<int> levels) const {
-  if (levels.value_or(1) < 1)
-    throw Error("levels", fmt::format("is {}; it has to be positive", *levels));
+  Require(levels.value_or(1) >= 1, "levels", levels.value_or(1), "positive");
   return engine_->Align(reference, current, guess, levels.value_or(options_.levels));
 }
 

@@ -110,7 +110,8 @@ struct AlignmentResult {
   bool ok() const { return failure == AlignmentFailure::kNone; }
 };
 
-/// Aligns images of one pinhole camera. Results are the same bits for any number of threads.
+/// Aligns images of one pinhole camera. Results are the same bits for any number of threads. Const
+/// calls may run at once; where they are tasks of TBB, with `threads` 1.
 class DirectAligner {
  public:
   /// What is kept of a reference image.

@@ -1,20 +1,14 @@
 #include <algorithm>
 
-#include <fmt/core.h>
-
 #include <sgf/alignment/point_selection.h>
-#include <sgf/core/error.h>
+#include <sgf/core/require.h>
 
 namespace sgf::alignment {
 
 void CheckOptions(const SelectionOptions& options) {
-  if (options.cell_px < 1)
-    throw Error("cell_px", fmt::format("is {}; it has to be positive", options.cell_px));
-  if (options.border_px < 0)
-    throw Error("border_px", fmt::format("is {}; it has to be at least 0", options.border_px));
-  if (!(options.min_gradient >= 0))
-    throw Error("min_gradient",
-                fmt::format("is {}; it has to be at least 0", options.min_gradient));
+  Require(options.cell_px >= 1, "cell_px", options.cell_px, "positive");
+  Require(options.border_px >= 0, "border_px", options.border_px, "at least 0");
+  Require(options.min_gradient >= 0, "min_gradient", options.min_gradient, "at least 0");
 }
 
 std::vector<cv::Point> SelectPoints(const SampleChannels& image, const cv::Mat1b& eligible,

@@ -11,6 +11,7 @@
 #include <sgf/apps/stereo_method.h>
 #include <sgf/core/error.h>
 #include <sgf/core/options.h>
+#include <sgf/core/require.h>
 #include <sgf/io/image.h>
 #include <sgf/io/ply.h>
 
@@ -97,9 +98,9 @@ stereo::CostOptions ToCostOptions(const OpenCvOptions& o) {
 void CheckOptions(const OpenCvOptions& o, int smallest_window) {
   constexpr int kLargestWindow = 255, kLargestUniqueness = 99;
   stereo::CheckCostOptions(ToCostOptions(o));
-  stereo::RequireRange("window", o.window, smallest_window, kLargestWindow);
+  RequireRange("window", o.window, smallest_window, kLargestWindow);
   stereo::RequireOdd("window", o.window);
-  stereo::RequireRange("uniqueness_pct", o.uniqueness_pct, 0, kLargestUniqueness);
+  RequireRange("uniqueness_pct", o.uniqueness_pct, 0, kLargestUniqueness);
 }
 
 int WholePercent(double uniqueness_pct) {

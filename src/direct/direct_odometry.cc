@@ -1,16 +1,19 @@
 #include <algorithm>
-#include <climits>
+#include <array>
 #include <cmath>
-#include <deque>
 
 #include <fmt/core.h>
 
 #include <sgf/alignment/warp.h>
 #include <sgf/core/error.h>
-#include <sgf/core/keyframe_choice.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 #include <sgf/core/stopwatch.h>
+#include <sgf/direct/activation.h>
 #include <sgf/direct/direct_odometry.h>
+#include <sgf/direct/leaving.h>
+#include <sgf/direct/pose_history.h>
+#include <sgf/direct/projection.h>
 
 namespace sgf::direct {
 namespace {
@@ -18,62 +21,15 @@ namespace {
 using alignment::ReferencePoint;
 using Eigen::Vector2f, Eigen::Vector3d;
 
-/// Where a pixel of known inverse depth is in another camera's image.
-struct Seen {
-  bool in_view = false;
-  Vector2f pixel = Vector2f::Zero();
-  float inverse_depth = 0;
-};
-
-/// Pixels have to be this far inside for a patch to be sampled.
-constexpr float kMargin = 4;  // px
-
-Seen Project(const Camera& camera, const SE3& T_target_host, const Vector2f& pixel,
-             double inverse_depth) {
-  const Eigen::Vector2d ray = alignment::RayOf<double>(camera, pixel.cast<double>());
-  const Vector3d X = T_target_host.R * ray.homogeneous() + inverse_depth * T_target_host.p;
-  if (!(X.z() > 1e-3)) return {};
-  Seen seen;
-  seen.pixel = {static_cast<float>(camera.fx * X.x() / X.z() + camera.cx),
-                static_cast<float>(camera.fy * X.y() / X.z() + camera.cy)};
-  seen.inverse_depth = static_cast<float>(inverse_depth / X.z());
-  seen.in_view = seen.pixel.x() >= kMargin && seen.pixel.y() >= kMargin &&
-                 seen.pixel.x() < camera.width - 1 - kMargin &&
-                 seen.pixel.y() < camera.height - 1 - kMargin;
-  return seen;
-}
-
-bool SeenBy(const ActivePoint& point, int keyframe) {
-  return std::any_of(point.observations.begin(), point.observations.end(),
-                     [&](const Observation& seen) { return seen.target == keyframe; });
-}
-
-/// Cells of an image that already have a point.
-class Occupancy {
- public:
-  Occupancy(const Camera& camera, double spacing_px)
-      : spacing_(static_cast<float>(spacing_px)),
-        cells_(static_cast<int>(camera.height / spacing_px) + 1,
-               static_cast<int>(camera.width / spacing_px) + 1, uint8_t{0}) {}
-
-  /// @return whether the place was free; it is taken then.
-  bool Take(const Vector2f& pixel) {
-    uint8_t& cell =
-        cells_(static_cast<int>(pixel.y() / spacing_), static_cast<int>(pixel.x() / spacing_));
-    if (cell) return false;
-    cell = 1;
-    return true;
-  }
-
- private:
-  float spacing_;
-  cv::Mat1b cells_;
-};
+/// How many of Hypotheses() come before the turns, which are for when none of these was followed.
+constexpr int kSteadyHypotheses = 4;
 
 /// Motions that may have happened since the last frame, T_cur_last, the likeliest first.
 std::vector<SE3> Hypotheses(const SE3& motion) {
   const SE3 none;
-  std::vector<SE3> motions = {motion, none, PartOf(motion, 0.5), motion * motion};
+  const std::array<SE3, kSteadyHypotheses> steady = {motion, none, PartOf(motion, 0.5),
+                                                     motion * motion};
+  std::vector<SE3> motions(steady.begin(), steady.end());
   // Turns about all axes and their diagonals, on top of the motion.
   for (const double angle : {0.02, 0.05})  // rad
     for (int x = -1; x <= 1; ++x)
@@ -92,25 +48,23 @@ void CheckOptions(const DirectOptions& options) {
   CheckOptions(options.tracking);
   CheckOptions(options.window);
   CheckOptions(options.initializer);
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
   if (options.tracking.residual == "bit_planes")
     throw Error("tracking.residual", "'bit_planes' has no window to go with it");
   if (options.tracking.residual == "lssd" && options.tracking.pattern == alignment::Pattern::kPoint)
     throw Error("tracking.residual", "'lssd' is constant over patches of one pixel");
-  require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
-  require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
-  require(options.keyframes >= options.min_keyframes && options.keyframes <= kMostKeyframes,
-          "keyframes", options.keyframes,
-          fmt::format("from min_keyframes to {}", kMostKeyframes).c_str());
-  require(options.keyframe_flow > 0, "keyframe_flow", options.keyframe_flow, "positive");
-  require(options.keyframe_parallax > 0, "keyframe_parallax", options.keyframe_parallax,
+  Require(options.active_points >= 100, "active_points", options.active_points, "at least 100");
+  Require(options.min_keyframes >= 3, "min_keyframes", options.min_keyframes, "at least 3");
+  Require(options.keyframes >= options.min_keyframes && options.keyframes <= kMostKeyframes,
+          "keyframes", options.keyframes, fmt::format("from min_keyframes to {}", kMostKeyframes));
+  Require(options.keyframe_flow > 0, "keyframe_flow", options.keyframe_flow, "positive");
+  Require(options.keyframe_parallax > 0, "keyframe_parallax", options.keyframe_parallax,
           "positive");
-  require(options.keyframe_brightness > 0, "keyframe_brightness", options.keyframe_brightness,
+  Require(options.keyframe_brightness > 0, "keyframe_brightness", options.keyframe_brightness,
           "positive");
-  require(options.lost_frames >= 1, "lost_frames", options.lost_frames, "positive");
-  require(options.threads >= 0, "threads", options.threads, "at least 0");
+  Require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
+          options.keyframe_inliers, "in [0, 1]");
+  Require(options.lost_frames >= 1, "lost_frames", options.lost_frames, "positive");
+  Require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
 class DirectOdometry::Impl {
@@ -122,8 +76,7 @@ class DirectOdometry::Impl {
         aligner_(camera, options_.tracking),
         depth_(MakeDepthEstimator(camera, options.depth)),
         selector_(options.selection),
-        first_spacing_px_(std::sqrt(0.5 * camera.width * camera.height / options.active_points)),
-        spacing_px_(first_spacing_px_) {
+        activation_(camera, options_) {
     CheckOptions(options);
     BeginMap();
   }
@@ -152,17 +105,17 @@ class DirectOdometry::Impl {
       if (NeedsKeyframe(result)) MakeKeyframe(result);
       result.times.keyframe_s = stage.Lap();
     }
-    if (!window_.empty()) result.T_world_cam = LastPose().Inverse();
+    if (!window_.empty()) result.T_world_cam = history_.LastPose().Inverse();
     result.segment = segment_;
-    result.active_points = CountActive();
+    result.active_points = CountActive(window_);
     result.times.total_s = total.Lap();
     return result;
   }
 
   std::vector<DirectPose> Trajectory() const {
     std::vector<DirectPose> poses;
-    for (const Record& record : records_)
-      poses.push_back({record.time_ns, record.segment, PoseOf(record).Inverse()});
+    for (const PoseHistory::Record& record : history_.records())
+      poses.push_back({record.time_ns, record.segment, history_.PoseOf(record).Inverse()});
     return poses;
   }
 
@@ -178,14 +131,6 @@ class DirectOdometry::Impl {
   }
 
  private:
-  /// A frame with a pose, as it lies to a key-frame.
-  struct Record {
-    std::int64_t time_ns = 0;
-    int segment = 0;
-    int keyframe = 0;  ///< id
-    SE3 T_cam_keyframe;
-  };
-
   /// A frame before there is a map.
   struct Waiting {
     std::int64_t time_ns = 0;
@@ -224,22 +169,8 @@ class DirectOdometry::Impl {
     if (!last_time_ns_) first_exposure_ms_ = exposure_ms;
   }
 
-  // --- Poses ---
-
-  const SE3& KeyframePose(int id) const { return keyframe_poses_.at(id); }
-
-  SE3 PoseOf(const Record& record) const {
-    return record.T_cam_keyframe * KeyframePose(record.keyframe);
-  }
-
-  SE3 LastPose() const { return PoseOf(records_.back()); }
-
   void Believe(std::int64_t time_ns, int keyframe, const SE3& T_cam_keyframe) {
-    records_.push_back({time_ns, segment_, keyframe, T_cam_keyframe});
-  }
-
-  void StorePoses() {
-    for (const auto& frame : window_) keyframe_poses_[frame->id] = frame->T_cam_world;
+    history_.Add({time_ns, segment_, keyframe, T_cam_keyframe});
   }
 
   // --- Begin ---
@@ -281,11 +212,10 @@ class DirectOdometry::Impl {
 
   std::unique_ptr<Keyframe> NewKeyframe(const SE3& T_cam_world, double log_exposure) {
     auto frame = std::make_unique<Keyframe>();
-    frame->id = static_cast<int>(keyframe_poses_.size());
+    frame->id = history_.AddKeyframe(T_cam_world);
     frame->T_cam_world = T_cam_world;
     frame->log_exposure = log_exposure;
     frame->brightness.a = log_exposure;
-    keyframe_poses_.push_back(T_cam_world);
     return frame;
   }
 
@@ -299,9 +229,9 @@ class DirectOdometry::Impl {
   bool MakeMap(const InitialMotion& motion) {
     constexpr size_t kMostViews = 12;  // that depth is searched in
     const int least_points = std::min(100, options_.selection.points / 2);
-    const SE3 T_world_first = records_.empty() ? SE3{} : LastPose().Inverse();
+    const SE3 T_world_first = history_.records().empty() ? SE3{} : history_.LastPose().Inverse();
     const size_t last = waiting_.size() - 1;
-    const size_t keyframes_before = keyframe_poses_.size();
+    const int keyframes_before = history_.keyframes();
     const auto pose_of = [&](size_t k) { return motion.T_cam_first[k] * T_world_first.Inverse(); };
 
     auto first = NewKeyframe(pose_of(0), waiting_[0].log_exposure);
@@ -332,8 +262,8 @@ class DirectOdometry::Impl {
     window_.push_back(std::move(first));
     window_.push_back(std::move(second));
     for (int round = 0; round < 3; ++round) last_refinement_ = Refine();
-    if (CountActive() < least_points || !last_refinement_.usable) {
-      keyframe_poses_.resize(keyframes_before);
+    if (CountActive(window_) < least_points || !last_refinement_.usable) {
+      history_.ForgetKeyframes(keyframes_before);
       return false;
     }
     AddImmature(*window_.back());
@@ -364,7 +294,8 @@ class DirectOdometry::Impl {
     Believe(waiting_.front().time_ns, first.id, {});
     // The refinement may have changed the scale.
     const double scale =
-        (KeyframePose(window_.back()->id) * KeyframePose(first.id).Inverse()).p.norm() /
+        (history_.KeyframePose(window_.back()->id) * history_.KeyframePose(first.id).Inverse())
+            .p.norm() /
         motion.T_cam_first.back().p.norm();
     for (size_t k = 1; k + 1 < waiting_.size(); ++k) {
       aligner_.MakePyramid(waiting_[k].grey, pyramid_);
@@ -378,14 +309,15 @@ class DirectOdometry::Impl {
   // --- Every frame ---
 
   void Track(DirectFrameResult& result) {
-    const Record& last = records_.back();
-    const SE3 T_last_ref = PoseOf(last) * KeyframePose(reference_id_).Inverse();
+    const auto& records = history_.records();
+    const PoseHistory::Record& last = records.back();
+    const SE3 T_last_ref = history_.PoseOf(last) * history_.KeyframePose(reference_id_).Inverse();
     SE3 motion;
-    if (records_.size() >= 2 && records_[records_.size() - 2].segment == segment_ && lost_ == 0) {
-      const Record& before = records_[records_.size() - 2];
+    if (records.size() >= 2 && records[records.size() - 2].segment == segment_ && lost_ == 0) {
+      const PoseHistory::Record& before = records[records.size() - 2];
       const double share = static_cast<double>(result.time_ns - last.time_ns) /
                            static_cast<double>(last.time_ns - before.time_ns);
-      motion = PartOf(PoseOf(last) * PoseOf(before).Inverse(), share);
+      motion = PartOf(history_.PoseOf(last) * history_.PoseOf(before).Inverse(), share);
     }
     alignment::AlignmentResult best;
     best.failure = alignment::AlignmentFailure::kFewPoints;
@@ -393,7 +325,7 @@ class DirectOdometry::Impl {
       const auto aligned = aligner_.Align(*reference_, pyramid_, hypothesis * T_last_ref);
       ++result.hypotheses;
       if (aligned.ok() && (!best.ok() || aligned.mean_cost < best.mean_cost)) best = aligned;
-      if (best.ok() && (LikeTheLast(best) || result.hypotheses >= 4)) break;
+      if (best.ok() && (LikeTheLast(best) || result.hypotheses >= kSteadyHypotheses)) break;
     }
     result.inlier_share = best.inlier_share;
     result.overlap = best.overlap;
@@ -433,12 +365,12 @@ class DirectOdometry::Impl {
              const RelativeBrightness& relative) const {
     ParallelForBatches(static_cast<int>(host.immature.size()), options_.threads, [&](int k) {
       ImmaturePoint& point = host.immature[k];
-      if (!GivenUp(point)) depth_->Trace(host, image, T_target_host, relative, point);
+      if (!point.GivenUp()) depth_->Trace(host, image, T_target_host, relative, point);
     });
   }
 
   void TraceAll() {
-    const SE3 T_cur_world = LastPose();
+    const SE3 T_cur_world = history_.LastPose();
     for (const auto& host : window_)
       Trace(*host, pyramid_.samples[0], T_cur_world * host->T_cam_world.Inverse(),
             Between(host->brightness, brightness_));
@@ -449,8 +381,8 @@ class DirectOdometry::Impl {
     int seen = 0;
     const SE3 moved{Eigen::Quaterniond::Identity(), T_cur_ref_.p};
     for (const ReferencePoint& point : reference_points_) {
-      const Seen full = Project(camera_, T_cur_ref_, point.pixel, point.inverse_depth);
-      const Seen shifted = Project(camera_, moved, point.pixel, point.inverse_depth);
+      const Projection full = Project(camera_, T_cur_ref_, point.pixel, point.inverse_depth);
+      const Projection shifted = Project(camera_, moved, point.pixel, point.inverse_depth);
       if (!full.in_view) continue;
       ++seen;
       flow += (full.pixel - point.pixel).squaredNorm();
@@ -472,8 +404,8 @@ class DirectOdometry::Impl {
     for (const auto& host : window_) {
       const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
       for (const ActivePoint& point : host->points) {
-        if (host.get() != &newest && !SeenBy(point, newest.id)) continue;
-        const Seen seen = Project(camera_, T, point.pixel, point.inverse_depth);
+        if (host.get() != &newest && !point.SeenBy(newest.id)) continue;
+        const Projection seen = Project(camera_, T, point.pixel, point.inverse_depth);
         if (seen.in_view) reference_points_.push_back({seen.pixel, seen.inverse_depth});
       }
     }
@@ -491,29 +423,22 @@ class DirectOdometry::Impl {
     depth_ = MakeDepthEstimator(camera, options_.depth);
   }
 
-  int CountActive() const {
-    int count = 0;
-    for (const auto& frame : window_) count += static_cast<int>(frame->points.size());
-    return count;
-  }
-
   WindowSummary Refine() {
     const WindowSummary summary = optimizer_->Refine(window_, first_exposure_ms_.has_value());
     if (options_.window.sigma_intrinsics > 0) UseCamera(optimizer_->camera());
-    StorePoses();
+    history_.Update(window_);
     return summary;
   }
 
   void MakeKeyframe(DirectFrameResult& result) {
-    auto frame = NewKeyframe(LastPose(), log_exposure_);
+    auto frame = NewKeyframe(history_.LastPose(), log_exposure_);
     frame->brightness = brightness_;
     frame->pyramid = std::move(pyramid_);
     pyramid_ = std::exchange(spare_, {});
-    records_.back().keyframe = frame->id;
-    records_.back().T_cam_keyframe = {};
+    history_.MakeLastKeyframe(frame->id);
     window_.push_back(std::move(frame));
     ObserveInNewest();
-    Activate();
+    activation_.Activate(camera_, *depth_, window_);
     last_refinement_ = Refine();
     result.window = last_refinement_;
     result.new_keyframe = true;
@@ -533,96 +458,6 @@ class DirectOdometry::Impl {
     }
   }
 
-  struct Candidate {
-    Keyframe* host;
-    size_t index;
-    RefinedDepth refined = {};
-    std::vector<View> views = {};
-  };
-
-  /// Turns points that are found well into active ones, where the newest image has room.
-  void Activate() {
-    const Keyframe& newest = *window_.back();
-    const int active = CountActive();
-    if (active < 0.8 * options_.active_points) spacing_px_ = std::max(2., 0.85 * spacing_px_);
-    if (active > 1.1 * options_.active_points)
-      spacing_px_ = std::min(3 * first_spacing_px_, 1.15 * spacing_px_);
-    Occupancy taken(camera_, spacing_px_);
-    for (const auto& host : window_) {
-      const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
-      for (const ActivePoint& point : host->points)
-        if (const Seen seen = Project(camera_, T, point.pixel, point.inverse_depth); seen.in_view)
-          taken.Take(seen.pixel);
-    }
-    std::vector<Candidate> candidates;
-    for (const auto& host : window_) {
-      const SE3 T = newest.T_cam_world * host->T_cam_world.Inverse();
-      for (size_t k = 0; host->id != newest.id && k < host->immature.size(); ++k) {
-        const ImmaturePoint& point = host->immature[k];
-        if (!Mature(point)) continue;
-        const Seen seen = Project(camera_, T, point.pixel, point.InverseDepth());
-        if (seen.in_view && taken.Take(seen.pixel)) candidates.push_back({host.get(), k});
-      }
-    }
-    ParallelForBatches(static_cast<int>(candidates.size()), options_.threads, [&](int k) {
-      Candidate& candidate = candidates[k];
-      const ImmaturePoint& point = candidate.host->immature[candidate.index];
-      candidate.views = ViewsOf(*candidate.host, point);
-      candidate.refined =
-          depth_->Refine(*candidate.host, point.pixel, point.InverseDepth(), candidate.views);
-    });
-    for (const Candidate& candidate : candidates) Promote(candidate);
-    for (const auto& host : window_) Prune(*host);
-  }
-
-  /// Twice not found where it has to be: moving, or hidden (DSO's rule).
-  static bool GivenUp(const ImmaturePoint& point) { return point.outliers >= 2; }
-
-  bool Mature(const ImmaturePoint& point) const {
-    constexpr float kMostInterval = 8;  // px
-    return point.found > 0 && point.quality >= options_.depth.min_quality &&
-           point.interval_px < kMostInterval && point.InverseDepth() > 0 &&
-           point.status != TraceStatus::kOutlier;
-  }
-
-  /// Views of the window's other key-frames that have the point in them.
-  std::vector<View> ViewsOf(const Keyframe& host, const ImmaturePoint& point) const {
-    std::vector<View> views;
-    for (const auto& target : window_) {
-      if (target->id == host.id) continue;
-      const SE3 T = target->T_cam_world * host.T_cam_world.Inverse();
-      if (Project(camera_, T, point.pixel, point.InverseDepth()).in_view)
-        views.push_back({target.get(), T});
-    }
-    return views;
-  }
-
-  void Promote(const Candidate& candidate) {
-    ImmaturePoint& point = candidate.host->immature[candidate.index];
-    point.outliers = INT_MAX;  // tried: leaves in any case
-    // In maps whose median depth is about 1; without parallax nothing is known. DSO's limit.
-    constexpr double kLeastInformation = 100;
-    if (candidate.refined.seen_by.empty() || candidate.refined.information < kLeastInformation)
-      return;
-    ActivePoint active{.pixel = point.pixel, .inverse_depth = candidate.refined.inverse_depth};
-    for (int k : candidate.refined.seen_by)
-      active.observations.push_back({candidate.views[k].target->id});
-    ++candidate.host->points_made;
-    candidate.host->points.push_back(active);
-  }
-
-  /// Takes out points that were activated or that are not in view any more.
-  void Prune(Keyframe& host) const {
-    const Keyframe& newest = *window_.back();
-    if (host.id == newest.id) return;
-    const SE3 T = newest.T_cam_world * host.T_cam_world.Inverse();
-    std::erase_if(host.immature, [&](const ImmaturePoint& point) {
-      if (GivenUp(point)) return true;
-      const bool known = std::isfinite(point.inverse_depth_max);
-      return known && !Project(camera_, T, point.pixel, point.InverseDepth()).in_view;
-    });
-  }
-
   MapPoint ToMapPoint(const Keyframe& host, const ActivePoint& point) const {
     const Eigen::Vector2d ray = alignment::RayOf<double>(camera_, point.pixel.cast<double>());
     return {.position = host.T_cam_world.Inverse() * (ray.homogeneous() / point.inverse_depth),
@@ -635,57 +470,22 @@ class DirectOdometry::Impl {
             .segment = segment_};
   }
 
-  /// Key-frames that leave: those the newest one hardly sees and, if there are still too many, the
-  /// one that is far from the newest and near to others (Engel, Koltun, Cremers, 2018, eq. 20).
-  std::vector<int> Leaving() const {
-    const int newest = static_cast<int>(window_.size()) - 1;
-    std::vector<int> leaving;
-    int left = newest + 1;
-    for (int k = 0; k < newest - 1 && left > options_.min_keyframes; ++k) {
-      const Keyframe& frame = *window_[k];
-      const auto seen = std::count_if(
-          frame.points.begin(), frame.points.end(),
-          [&](const ActivePoint& point) { return SeenBy(point, window_[newest]->id); });
-      constexpr double kLeastSeen = 0.05;
-      const auto in_view = static_cast<double>(seen + std::ssize(frame.immature));
-      const double gain = std::abs(frame.brightness.a - window_[newest]->brightness.a);
-      constexpr double kMostGain = 0.7;
-      if (in_view < kLeastSeen * std::max(1, frame.points_made) || gain > kMostGain) {
-        leaving.push_back(k);
-        --left;
-      }
-    }
-    if (left <= options_.keyframes) return leaving;
-    std::vector<Vector3d> places;
-    for (int k = 0; k < newest - 1; ++k) places.push_back(window_[k]->T_cam_world.Inverse().p);
-    const int farthest =
-        static_cast<int>(LeastUsefulKeyframe(places, window_[newest]->T_cam_world.Inverse().p));
-    if (std::find(leaving.begin(), leaving.end(), farthest) == leaving.end())
-      leaving.push_back(farthest);
-    return leaving;
-  }
-
   /// Points and key-frames leave the window: what they say stays as the prior, or is dropped.
   void LeaveWindow() {
-    const std::vector<int> leaving = Leaving();
-    const int newest = static_cast<int>(window_.size()) - 1;
+    const std::vector<int> leaving = LeavingKeyframes(window_, options_);
+    const std::vector<std::vector<char>> gone = LeavingPoints(window_, leaving);
     std::vector<std::pair<int, const ActivePoint*>> marginalised;
-    std::vector<std::vector<char>> gone(window_.size());
-    for (int k = 0; k <= newest; ++k) {
-      const bool host_leaves = std::find(leaving.begin(), leaving.end(), k) != leaving.end();
-      for (const ActivePoint& point : window_[k]->points) {
-        const bool seen = SeenBy(point, window_[newest]->id) ||
-                          (newest > 0 && SeenBy(point, window_[newest - 1]->id));
-        const bool leaves = host_leaves || !seen;
-        gone[k].push_back(leaves);
-        if (!leaves) continue;
+    for (size_t k = 0; k < window_.size(); ++k)
+      for (size_t i = 0; i < gone[k].size(); ++i) {
+        if (!gone[k][i]) continue;
+        const ActivePoint& point = window_[k]->points[i];
         finished_.push_back(ToMapPoint(*window_[k], point));
         constexpr size_t kLeastObservations = 2;
-        if (point.observations.size() >= kLeastObservations) marginalised.emplace_back(k, &point);
+        if (point.observations.size() >= kLeastObservations)
+          marginalised.emplace_back(static_cast<int>(k), &point);
       }
-    }
     optimizer_->Marginalize(window_, marginalised);
-    for (int k = 0; k <= newest; ++k) {
+    for (size_t k = 0; k < window_.size(); ++k) {
       std::vector<ActivePoint> stay;
       for (size_t i = 0; i < window_[k]->points.size(); ++i)
         if (!gone[k][i]) stay.push_back(std::move(window_[k]->points[i]));
@@ -713,13 +513,13 @@ class DirectOdometry::Impl {
   alignment::DirectAligner aligner_;
   std::unique_ptr<const DepthEstimator> depth_;
   PixelSelector selector_;
+  PointActivation activation_;
 
   std::optional<Initializer> initializer_;  ///< while there is no map
   std::vector<Waiting> waiting_;
   std::optional<WindowOptimizer> optimizer_;
   Window window_;
   WindowSummary last_refinement_;
-  double first_spacing_px_, spacing_px_;
 
   std::vector<ReferencePoint> reference_points_;  ///< in the newest key-frame
   std::shared_ptr<const alignment::DirectAligner::Reference> reference_;
@@ -734,8 +534,7 @@ class DirectOdometry::Impl {
   Brightness brightness_;
   double log_exposure_ = 0;
 
-  std::vector<Record> records_;
-  std::vector<SE3> keyframe_poses_;  ///< T_cam_world by id, those that left as well
+  PoseHistory history_;
   std::vector<MapPoint> finished_;
   int segment_ = 0;
   int lost_ = 0;

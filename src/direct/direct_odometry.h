@@ -131,7 +131,8 @@ struct MapPoint {
 };
 
 /// Odometry of one camera. Frames are handed over one at a time. Same input, same bits, for any
-/// number of threads. Memory does not grow with the sequence but for the poses.
+/// number of threads. Memory does not grow with the sequence but for the poses. Calls of one object
+/// must not overlap; objects share no state.
 class DirectOdometry {
  public:
   /// @param camera without distortion.

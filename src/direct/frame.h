@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -63,6 +64,9 @@ struct ImmaturePoint {
   int outliers = 0;  ///< in a row
 
   float InverseDepth() const { return 0.5f * (inverse_depth_min + inverse_depth_max); }
+
+  /// Twice not found where it has to be: moving, or hidden (DSO's rule).
+  bool GivenUp() const { return outliers >= 2; }
 };
 
 /// How a point of the window is seen by another key-frame.
@@ -78,6 +82,11 @@ struct ActivePoint {
   double variance = INFINITY;  ///< of the inverse depth
   int support = 0;             ///< key-frames that saw it so far, those that left as well
   std::vector<Observation> observations = {};
+
+  bool SeenBy(int keyframe) const {
+    return std::any_of(observations.begin(), observations.end(),
+                       [&](const Observation& seen) { return seen.target == keyframe; });
+  }
 };
 
 /// A key-frame of the window.
@@ -98,5 +107,12 @@ struct Keyframe {
 };
 
 using Window = std::vector<std::unique_ptr<Keyframe>>;  ///< oldest first
+
+/// Active points of all key-frames.
+inline int CountActive(const Window& window) {
+  int count = 0;
+  for (const auto& frame : window) count += static_cast<int>(frame->points.size());
+  return count;
+}
 
 }  // namespace sgf::direct

@@ -2,13 +2,12 @@
 #include <cmath>
 
 #include <Eigen/Core>
-#include <fmt/core.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/direct/initializer.h>
 
 namespace sgf::direct {
@@ -50,16 +49,13 @@ std::vector<T> Kept(const std::vector<T>& values, const std::vector<uchar>& keep
 }  // namespace
 
 void CheckOptions(const InitializerOptions& options) {
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
-  require(options.corners >= kLeastCorners, "initializer.corners", options.corners, "at least 60");
-  require(options.min_flow > 0, "initializer.min_flow", options.min_flow, "positive");
-  require(options.min_parallax_deg > 0, "initializer.min_parallax_deg", options.min_parallax_deg,
+  Require(options.corners >= kLeastCorners, "initializer.corners", options.corners, "at least 60");
+  Require(options.min_flow > 0, "initializer.min_flow", options.min_flow, "positive");
+  Require(options.min_parallax_deg > 0, "initializer.min_parallax_deg", options.min_parallax_deg,
           "positive");
-  require(options.min_inliers > 0 && options.min_inliers <= 1, "initializer.min_inliers",
+  Require(options.min_inliers > 0 && options.min_inliers <= 1, "initializer.min_inliers",
           options.min_inliers, "in (0, 1]");
-  require(options.max_frames >= 2, "initializer.max_frames", options.max_frames, "at least 2");
+  Require(options.max_frames >= 2, "initializer.max_frames", options.max_frames, "at least 2");
 }
 
 Initializer::Initializer(const Camera& camera, const InitializerOptions& options)

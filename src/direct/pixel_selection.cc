@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
 
-#include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/direct/pixel_selection.h>
 
 namespace sgf::direct {
@@ -85,13 +84,10 @@ std::vector<cv::Point> SelectInCells(const SampleChannels& image, const cv::Mat1
 }  // namespace
 
 void CheckOptions(const PixelSelectionOptions& options) {
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
-  require(options.points >= 50, "selection.points", options.points, "at least 50");
-  require(options.block_px >= 8, "selection.block_px", options.block_px, "at least 8");
-  require(options.above_median >= 0, "selection.above_median", options.above_median, "at least 0");
-  require(options.border_px >= 3, "selection.border_px", options.border_px, "at least 3");
+  Require(options.points >= 50, "selection.points", options.points, "at least 50");
+  Require(options.block_px >= 8, "selection.block_px", options.block_px, "at least 8");
+  Require(options.above_median >= 0, "selection.above_median", options.above_median, "at least 0");
+  Require(options.border_px >= 3, "selection.border_px", options.border_px, "at least 3");
 }
 
 PixelSelector::PixelSelector(const PixelSelectionOptions& options) : options_(options) {

@@ -41,6 +41,8 @@ class PixelSelector {
   /// @throws Error as CheckOptions().
   explicit PixelSelector(const PixelSelectionOptions& options);
 
+  /// @return pixels (px of the image) at least `border_px` inside, in the order of the cells, about
+  ///   `points` of them; fewer where the image has no more, none where it has no gradients.
   std::vector<cv::Point> operator()(const alignment::SampleChannels& image);
 
  private:

@@ -83,15 +83,7 @@ class PriorCost : public ceres::CostFunction {
   }
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    Eigen::Map<Eigen::VectorXd> r(residuals, root_.e.size());
-    r = root_.e;
-    for (size_t k = 0; k < parameter_block_sizes().size(); ++k) {
-      const auto S =
-          root_.S.middleCols<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
-      r += S * Eigen::Map<const FrameParameters>(parameters[k]);
-      using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
-      if (jacobians && jacobians[k]) Eigen::Map<RowMajor>(jacobians[k], S.rows(), S.cols()) = S;
-    }
+    EvaluateRows(root_.S, root_.e, parameter_block_sizes(), parameters, residuals, jacobians);
     return true;
   }
 

@@ -6,6 +6,7 @@
 #include <sgf/alignment/patch_alignment.h>
 #include <sgf/alignment/residual_table.h>
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/direct/tracing.h>
 
 namespace sgf::direct {
@@ -305,15 +306,12 @@ void CheckOptions(const TracingOptions& options) {
     if constexpr (!kEstimatesDepth<std::remove_cvref_t<decltype(residual)>>)
       throw Error("depth.residual", fmt::format("'{}' cannot estimate depth", options.residual));
   });
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
-  require(options.max_length > 0 && options.max_length <= 0.05, "depth.max_length",
+  Require(options.max_length > 0 && options.max_length <= 0.05, "depth.max_length",
           options.max_length, "in (0, 0.05]");
-  require(options.min_correlation > -1 && options.min_correlation < 1, "depth.min_correlation",
+  Require(options.min_correlation > -1 && options.min_correlation < 1, "depth.min_correlation",
           options.min_correlation, "in (-1, 1)");
-  require(options.min_quality >= 1, "depth.min_quality", options.min_quality, "at least 1");
-  require(options.max_iterations >= 1, "depth.max_iterations", options.max_iterations, "positive");
+  Require(options.min_quality >= 1, "depth.min_quality", options.min_quality, "at least 1");
+  Require(options.max_iterations >= 1, "depth.max_iterations", options.max_iterations, "positive");
 }
 
 ImmaturePoint MakeImmaturePoint(const SampleChannels& image, const Vector2f& pixel) {

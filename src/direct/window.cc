@@ -11,6 +11,7 @@
 #include <sgf/alignment/patch_alignment.h>
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 #include <sgf/core/square_root.h>
 #include <sgf/direct/prior_costs.h>
 #include <sgf/direct/window.h>
@@ -110,26 +111,14 @@ class WindowOptimizer::Engine {
     bool Evaluate(double const* const* parameters, double* residuals,
                   double** jacobians) const override {
       engine_.MoveTo(window_, parameters);
-      Eigen::Map<VectorXd> r(residuals, num_residuals());
-      r.setZero();
-      const bool linearize = jacobians != nullptr;
-      const double cost = engine_.Evaluate(window_, linearize);
-      if (!linearize) {
-        r(0) = std::sqrt(2 * cost);
+      const double cost = engine_.Evaluate(window_, jacobians != nullptr);
+      if (!jacobians) {
+        std::fill_n(residuals, num_residuals(), 0.);
+        residuals[0] = std::sqrt(2 * cost);
         return std::isfinite(cost);
       }
       const Reduced reduced = engine_.Reduce(window_);
-      const SquareRoot root = SquareRootOf(reduced.H, reduced.b);
-      r.head(root.e.size()) = root.e;
-      r(r.size() - 1) = std::sqrt(std::max(0., 2 * cost - root.e.squaredNorm()));
-      for (size_t k = 0; k < engine_.Blocks(window_); ++k) {
-        if (!jacobians[k]) continue;
-        using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, kFrameParameters, Eigen::RowMajor>;
-        Eigen::Map<RowMajor> J(jacobians[k], num_residuals(), kFrameParameters);
-        J.setZero();
-        J.topRows(root.S.rows()) =
-            root.S.middleCols<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
-      }
+      EvaluateReduced(cost, reduced.H, reduced.b, parameter_block_sizes(), residuals, jacobians);
       return std::isfinite(cost);
     }
 
@@ -614,18 +603,14 @@ void CheckOptions(const WindowOptions& options) {
     throw Error("window.sigma_intrinsics",
                 fmt::format("has to be 0 with '{}': only 'photo_affine' refines the camera",
                             options.residual));
-  if (!(options.sigma_intrinsics >= 0))
-    throw Error("window.sigma_intrinsics",
-                fmt::format("is {}; it has to be at least 0", options.sigma_intrinsics));
-  const auto require = [](bool valid, const char* option, double value) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be positive", value));
-  };
-  require(options.max_iterations >= 1, "window.max_iterations", options.max_iterations);
-  require(options.max_cost > 0, "window.max_cost", options.max_cost);
-  require(options.sigma_a > 0, "window.sigma_a", options.sigma_a);
-  require(options.sigma_b > 0, "window.sigma_b", options.sigma_b);
-  require(options.sigma_a_known > 0, "window.sigma_a_known", options.sigma_a_known);
-  require(options.sigma_b_known > 0, "window.sigma_b_known", options.sigma_b_known);
+  Require(options.sigma_intrinsics >= 0, "window.sigma_intrinsics", options.sigma_intrinsics,
+          "at least 0");
+  Require(options.max_iterations >= 1, "window.max_iterations", options.max_iterations, "positive");
+  Require(options.max_cost > 0, "window.max_cost", options.max_cost, "positive");
+  Require(options.sigma_a > 0, "window.sigma_a", options.sigma_a, "positive");
+  Require(options.sigma_b > 0, "window.sigma_b", options.sigma_b, "positive");
+  Require(options.sigma_a_known > 0, "window.sigma_a_known", options.sigma_a_known, "positive");
+  Require(options.sigma_b_known > 0, "window.sigma_b_known", options.sigma_b_known, "positive");
 }
 
 WindowOptimizer::WindowOptimizer(const Camera& camera, const WindowOptions& options, int threads) {

@@ -7,6 +7,7 @@
 
 #include <sgf/core/error.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 #include <sgf/core/stopwatch.h>
 #include <sgf/flow/detection.h>
 #include <sgf/flow/patch_tracker.h>
@@ -17,12 +18,6 @@ namespace {
 
 using Eigen::Vector2f, Eigen::Vector3d;
 using internal::PatchTemplate, internal::PatchTracker, internal::PatchWarp, internal::Pyramid;
-
-void RequireRange(const char* name, double value, double least, double most) {
-  if (!(value >= least && value <= most))
-    throw Error(fmt::format("flow.{}", name),
-                fmt::format("is {}; it has to be in [{}, {}]", value, least, most));
-}
 
 void CheckRig(const StereoRig& rig, const FlowOptions& options) {
   constexpr int kLeastSide = 8;  // px, of the coarsest level
@@ -98,17 +93,17 @@ struct Track {
 void CheckOptions(const FlowOptions& o) {
   if (!internal::CanTrack(o.residual))
     throw Error("flow.residual", fmt::format("patches cannot be followed by '{}'", o.residual));
-  RequireRange("levels", o.levels, 1, 12);
-  RequireRange("stereo_levels", o.stereo_levels, 1, o.levels);
-  RequireRange("max_iterations", o.max_iterations, 1, 1000);
-  RequireRange("tolerance_px", o.tolerance_px, 0, 1);
-  RequireRange("cell_px", o.cell_px, 8, 1e6);
-  RequireRange("border_px", o.border_px, 0, 1e6);
-  RequireRange("least_fast_threshold", o.least_fast_threshold, 1, 255);
-  RequireRange("fast_threshold", o.fast_threshold, o.least_fast_threshold, 255);
-  RequireRange("max_backward_px", o.max_backward_px, 0, 1e6);
-  RequireRange("max_disparity_px", o.max_disparity_px, 0, 1e6);
-  RequireRange("max_epipolar_error", o.max_epipolar_error, 0, 2);
+  RequireRange("flow.levels", o.levels, 1, 12);
+  RequireRange("flow.stereo_levels", o.stereo_levels, 1, o.levels);
+  RequireRange("flow.max_iterations", o.max_iterations, 1, 1000);
+  RequireRange("flow.tolerance_px", o.tolerance_px, 0, 1);
+  RequireRange("flow.cell_px", o.cell_px, 8, 1e6);
+  RequireRange("flow.border_px", o.border_px, 0, 1e6);
+  RequireRange("flow.least_fast_threshold", o.least_fast_threshold, 1, 255);
+  RequireRange("flow.fast_threshold", o.fast_threshold, o.least_fast_threshold, 255);
+  RequireRange("flow.max_backward_px", o.max_backward_px, 0, 1e6);
+  RequireRange("flow.max_disparity_px", o.max_disparity_px, 0, 1e6);
+  RequireRange("flow.max_epipolar_error", o.max_epipolar_error, 0, 2);
   metrics::CheckOptions(o.image.epsilon);
   ResolveThreads(o.threads);
 }

@@ -112,7 +112,8 @@ struct FlowFrame {
 };
 
 /// Follows points from frame to frame. Memory is that of three image pyramids and the tracks, at
-/// most about two for each cell of the grid.
+/// most about two for each cell of the grid. Calls of one object must not overlap; objects share
+/// no state.
 class StereoFlow {
  public:
   /// @throws Error as CheckOptions(), for a camera that is none (Camera::Check()), cameras at one

@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/core/stopwatch.h>
 #include <sgf/odometry/odometry.h>
 
@@ -82,23 +83,20 @@ class GyroBuffer {
 }  // namespace
 
 void CheckOptions(const OdometryOptions& options) {
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
   CheckOptions(options.selection);
   CheckOptions(options.refinement);
   if (!(options.min_depth_m > 0 && options.max_depth_m > options.min_depth_m &&
         std::isfinite(options.max_depth_m)))
     throw Error("min_depth_m", fmt::format("is {} with max_depth_m {}; 0 < min < max < infinity",
                                            options.min_depth_m, options.max_depth_m));
-  require(options.keyframe_overlap >= 0 && options.keyframe_overlap <= 1, "keyframe_overlap",
+  Require(options.keyframe_overlap >= 0 && options.keyframe_overlap <= 1, "keyframe_overlap",
           options.keyframe_overlap, "in [0, 1]");
-  require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
+  Require(options.keyframe_inliers >= 0 && options.keyframe_inliers <= 1, "keyframe_inliers",
           options.keyframe_inliers, "in [0, 1]");
-  require(options.tracking_levels >= 1, "tracking_levels", options.tracking_levels, "positive");
-  require(options.relocation_keyframes >= 1, "relocation_keyframes", options.relocation_keyframes,
+  Require(options.tracking_levels >= 1, "tracking_levels", options.tracking_levels, "positive");
+  Require(options.relocation_keyframes >= 1, "relocation_keyframes", options.relocation_keyframes,
           "positive");
-  require(options.lost_frames >= 0, "lost_frames", options.lost_frames, "at least 0");
+  Require(options.lost_frames >= 0, "lost_frames", options.lost_frames, "at least 0");
 }
 
 class Odometry::Impl {
@@ -109,8 +107,7 @@ class Odometry::Impl {
         aligner_(rig.camera, options.alignment),
         matcher_(options.matcher) {
     CheckOptions(options);
-    if (!(rig.baseline_m >= 0))
-      throw Error("baseline_m", fmt::format("is {}; it has to be at least 0", rig.baseline_m));
+    Require(rig.baseline_m >= 0, "baseline_m", rig.baseline_m, "at least 0");
   }
 
   FrameResult ProcessStereo(std::int64_t time_ns, const cv::Mat& left, const cv::Mat& right) {

@@ -118,6 +118,7 @@ struct Keyframe {
 
 /// Visual odometry against the last key-frame. Frames are handed over one at a time, in the order
 /// of their times; the pose is that at frame time and is not changed later. Same input, same bits.
+/// Calls of one object must not overlap; objects share no state.
 class Odometry {
  public:
   /// @throws Error for a camera with distortion or out of range, or an option out of range.

@@ -6,6 +6,7 @@
 #include <sgf/alignment/patch_alignment.h>
 #include <sgf/alignment/residual_table.h>
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/odometry/stereo_depth.h>
 
 namespace sgf::odometry {
@@ -83,15 +84,11 @@ void CheckOptions(const RefinementOptions& options) {
       throw Error("refinement.residual",
                   fmt::format("'{}' cannot refine depths", options.residual));
   });
-  if (options.max_iterations < 1)
-    throw Error("refinement.max_iterations",
-                fmt::format("is {}; it has to be positive", options.max_iterations));
-  if (!(options.max_change_px > 0))
-    throw Error("refinement.max_change_px",
-                fmt::format("is {}; it has to be positive", options.max_change_px));
-  if (!(options.min_correlation >= -1 && options.min_correlation < 1))
-    throw Error("refinement.min_correlation",
-                fmt::format("is {}; it has to be in [-1, 1)", options.min_correlation));
+  Require(options.max_iterations >= 1, "refinement.max_iterations", options.max_iterations,
+          "positive");
+  Require(options.max_change_px > 0, "refinement.max_change_px", options.max_change_px, "positive");
+  Require(options.min_correlation >= -1 && options.min_correlation < 1,
+          "refinement.min_correlation", options.min_correlation, "in [-1, 1)");
 }
 
 void RefineDepths(const SampleChannels& left, const SampleChannels& right, const Camera& camera,

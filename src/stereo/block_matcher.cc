@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/stereo/band.h>
 #include <sgf/stereo/block_matcher.h>
 #include <sgf/stereo/cost_rows.h>

@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/metrics/registry.h>
 #include <sgf/stereo/cost_options.h>
 
@@ -17,14 +18,7 @@ std::span<const std::pair<const char*, Prefilter>> EnumNames(Prefilter) {
   return kNames;
 }
 
-void RequireRange(const char* option, double value, double low, double high) {
-  if (!(value >= low && value <= high))
-    throw Error(option, fmt::format("must be in [{}, {}], got {}", low, high, value));
-}
-
-void RequireOdd(const char* option, int value) {
-  if (value % 2 == 0) throw Error(option, fmt::format("must be odd, got {}", value));
-}
+void RequireOdd(const char* option, int value) { Require(value % 2 != 0, option, value, "odd"); }
 
 void CheckCostOptions(const CostOptions& o) {
   if (o.metric != kCensusSobel &&

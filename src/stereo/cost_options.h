@@ -77,9 +77,6 @@ void CheckCostOptions(const CostOptions& options);
 /// @throws Error for two images that do not fit each other or the options.
 void CheckPair(const cv::Mat& left, const cv::Mat& right, const CostOptions& options);
 
-/// @throws Error naming the option unless low <= value <= high.
-void RequireRange(const char* option, double value, double low, double high);
-
 /// @throws Error naming the option unless it is odd.
 void RequireOdd(const char* option, int value);
 

@@ -5,6 +5,7 @@
 
 #include <opencv2/calib3d.hpp>
 
+#include <sgf/core/require.h>
 #include <sgf/stereo/cost_options.h>
 #include <sgf/stereo/matches.h>
 

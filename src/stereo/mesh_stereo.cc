@@ -7,6 +7,7 @@
 
 #include <sgf/core/error.h>
 #include <sgf/core/random.h>
+#include <sgf/core/require.h>
 #include <sgf/stereo/cost_rows.h>
 #include <sgf/stereo/mesh_refine.h>
 #include <sgf/stereo/mesh_stereo.h>

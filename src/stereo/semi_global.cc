@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/stereo/cost_rows.h>
 #include <sgf/stereo/prefilter.h>
 #include <sgf/stereo/semi_global.h>

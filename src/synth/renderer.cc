@@ -9,6 +9,7 @@
 #include <sgf/core/error.h>
 #include <sgf/core/options.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 #include <sgf/synth/lightmap.h>
 #include <sgf/synth/ray_scene.h>
 #include <sgf/synth/renderer.h>
@@ -242,13 +243,10 @@ void Renderer::Impl::RenderRow(const PixelRays::Impl& pixel_rays, const Eigen::M
 namespace {
 
 void CheckInput(const Scene& scene, const RenderOptions& options) {
-  const auto require = [](bool ok, const char* key, int value, const char* range) {
-    if (!ok) throw Error(key, fmt::format("is {}; it has to be {}", value, range));
-  };
   SamplePlaces(options.samples_per_pixel);
-  require(options.light_texels > 0, "light_texels", options.light_texels, "positive");
-  require(options.light_samples > 0, "light_samples", options.light_samples, "positive");
-  require(options.bounce_samples > 0, "bounce_samples", options.bounce_samples, "positive");
+  Require(options.light_texels > 0, "light_texels", options.light_texels, "positive");
+  Require(options.light_samples > 0, "light_samples", options.light_samples, "positive");
+  Require(options.bounce_samples > 0, "bounce_samples", options.bounce_samples, "positive");
   if (scene.objects.empty()) throw Error(scene.name, "the scene has no objects");
   const auto groups = static_cast<int>(scene.LightGroups().size());
   if (groups < 1 || groups > kMaxGroups)

@@ -10,6 +10,7 @@
 #include <sgf/core/error.h>
 #include <sgf/core/options.h>
 #include <sgf/core/parallel.h>
+#include <sgf/core/require.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/dso_calibration.h>
 #include <sgf/io/hash.h>
@@ -58,20 +59,17 @@ SE3 FromMatrix(const std::array<double, 12>& rows) {
 }  // namespace
 
 void CheckRecipe(const SequenceRecipe& recipe) {
-  const auto require = [](bool ok, const char* key, auto value, const char* rule) {
-    if (!ok) throw Error(key, fmt::format("is {}; it has to be {}", value, rule));
-  };
   const ShortOptions& part = recipe.short_version;
-  require(recipe.duration_s >= 1 && recipe.duration_s <= 3600, "duration_s", recipe.duration_s,
+  Require(recipe.duration_s >= 1 && recipe.duration_s <= 3600, "duration_s", recipe.duration_s,
           "1 to 3600 s");
-  require(part.frames >= 1 && part.frames <= 200, "short.frames", part.frames, "1 to 200");
-  require(part.from_s >= 0, "short.from_s", part.from_s, "0 or more");
-  require(
+  Require(part.frames >= 1 && part.frames <= 200, "short.frames", part.frames, "1 to 200");
+  Require(part.from_s >= 0, "short.from_s", part.from_s, "0 or more");
+  Require(
       Frames(recipe, SequenceVersion::kShort).Time(part.frames - 1) <= recipe.duration_s - kLead_s,
       "short.frames", part.frames, "within duration_s");
-  require(recipe.exposure.max_ms <= 1000 / kFrameRate, "exposure.max_ms", recipe.exposure.max_ms,
+  Require(recipe.exposure.max_ms <= 1000 / kFrameRate, "exposure.max_ms", recipe.exposure.max_ms,
           "at most the time between frames, 50 ms");
-  require(recipe.blur_samples >= 1 && recipe.blur_samples % 2 == 1, "blur_samples",
+  Require(recipe.blur_samples >= 1 && recipe.blur_samples % 2 == 1, "blur_samples",
           recipe.blur_samples, "odd and positive");
   Check(recipe.photometry);  // these two before Estimate() reckons with them
   Check(recipe.imu);

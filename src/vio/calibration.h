@@ -26,7 +26,10 @@ struct Calibration {
   }
 };
 
+/// The calibration moved along its tangent: R <- R Exp(d), the other numbers are added.
 Calibration Plus(const Calibration& calibration, const CalibrationVector& delta);
+
+/// The tangent at `from` that leads to `to`: Plus(from, Minus(to, from)) is `to`.
 CalibrationVector Minus(const Calibration& to, const Calibration& from);
 
 /// How a body moves: in world coordinates (m/s) and about its own axes (rad/s).

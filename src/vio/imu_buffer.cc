@@ -6,6 +6,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/vio/imu_buffer.h>
 
 namespace sgf::vio {
@@ -13,19 +14,17 @@ namespace sgf::vio {
 namespace {
 
 void Check(const ImuBufferOptions& o) {
+  for (const auto& [name, value] : {std::pair("imu.max_gap_s", o.max_gap_s),
+                                    std::pair("imu.gyro_full_scale", o.gyro_full_scale),
+                                    std::pair("imu.accel_full_scale", o.accel_full_scale),
+                                    std::pair("imu.max_span_s", o.max_span_s)})
+    Require(value > 0, name, value, "positive");
+  Require(o.max_bridge_s >= o.max_gap_s, "imu.max_bridge_s", o.max_bridge_s,
+          fmt::format("at least imu.max_gap_s, {}", o.max_gap_s));
   for (const auto& [name, value] :
-       {std::pair("max_gap_s", o.max_gap_s), std::pair("gyro_full_scale", o.gyro_full_scale),
-        std::pair("accel_full_scale", o.accel_full_scale), std::pair("max_span_s", o.max_span_s)})
-    if (!(value > 0))
-      throw Error("imu", fmt::format("{} is {}; it has to be positive", name, value));
-  if (!(o.max_bridge_s >= o.max_gap_s))
-    throw Error("imu", fmt::format("max_bridge_s is {}; it has to be at least max_gap_s, {}",
-                                   o.max_bridge_s, o.max_gap_s));
-  for (const auto& [name, value] :
-       {std::pair("gap_noise_factor", o.gap_noise_factor),
-        std::pair("saturation_noise_factor", o.saturation_noise_factor)})
-    if (!(value >= 1 && std::isfinite(value)))
-      throw Error("imu", fmt::format("{} is {}; it has to be at least 1", name, value));
+       {std::pair("imu.gap_noise_factor", o.gap_noise_factor),
+        std::pair("imu.saturation_noise_factor", o.saturation_noise_factor)})
+    Require(value >= 1 && std::isfinite(value), name, value, "finite and at least 1");
 }
 
 double Seconds(std::int64_t from_ns, std::int64_t to_ns) {

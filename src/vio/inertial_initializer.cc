@@ -8,6 +8,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/vio/inertial_initializer.h>
 
 namespace sgf::vio {
@@ -16,23 +17,6 @@ using Eigen::Matrix3d, Eigen::MatrixXd, Eigen::Quaterniond, Eigen::Vector3d, Eig
 using Problem = InitialisationProblem;
 
 namespace {
-
-void Check(const InertialInitializerOptions& o) {
-  for (const auto& [name, value] :
-       {std::pair("gravity", o.gravity), std::pair("min_rest_s", o.min_rest_s),
-        std::pair("rest_gyro_sd", o.rest_gyro_sd), std::pair("rest_accel_sd", o.rest_accel_sd),
-        std::pair("max_gyro_bias", o.max_gyro_bias),
-        std::pair("visual_rotation_sd_rad", o.visual_rotation_sd_rad),
-        std::pair("visual_position_sd_m", o.visual_position_sd_m),
-        std::pair("accel_bias_sd", o.accel_bias_sd),
-        std::pair("max_tilt_sd_rad", o.max_tilt_sd_rad),
-        std::pair("max_motion_error", o.max_motion_error)})
-    if (!(value > 0 && std::isfinite(value)))
-      throw Error("initializer", fmt::format("{} is {}; it has to be positive", name, value));
-  if (o.min_poses < 4)
-    throw Error("initializer",
-                fmt::format("min_poses is {}; it has to be at least 4", o.min_poses));
-}
 
 void Check(std::span<const TimedPose> poses, std::span<const Preintegration> motions) {
   if (motions.size() + 1 != poses.size())
@@ -337,6 +321,22 @@ void SolveMotion(std::span<const TimedPose> poses, std::span<const Preintegratio
 
 }  // namespace
 
+void CheckOptions(const InertialInitializerOptions& options) {
+  for (const auto& [name, value] :
+       {std::pair("start.gravity", options.gravity),
+        std::pair("start.min_rest_s", options.min_rest_s),
+        std::pair("start.rest_gyro_sd", options.rest_gyro_sd),
+        std::pair("start.rest_accel_sd", options.rest_accel_sd),
+        std::pair("start.max_gyro_bias", options.max_gyro_bias),
+        std::pair("start.visual_rotation_sd_rad", options.visual_rotation_sd_rad),
+        std::pair("start.visual_position_sd_m", options.visual_position_sd_m),
+        std::pair("start.accel_bias_sd", options.accel_bias_sd),
+        std::pair("start.max_tilt_sd_rad", options.max_tilt_sd_rad),
+        std::pair("start.max_motion_error", options.max_motion_error)})
+    Require(value > 0 && std::isfinite(value), name, value, "finite and positive");
+  Require(options.min_poses >= 4, "start.min_poses", options.min_poses, "at least 4");
+}
+
 std::span<const std::pair<const char*, Problem>> EnumNames(Problem) {
   static constexpr std::pair<const char*, Problem> kNames[] = {
       {"none", Problem::kNone},
@@ -382,7 +382,7 @@ const char* Explain(Problem problem) {
 
 InertialInitialisation InitializeAtRest(std::span<const ImuSample> samples,
                                         const InertialInitializerOptions& options) {
-  Check(options);
+  CheckOptions(options);
   InertialInitialisation result;
   if (samples.size() < 2 ||
       1e-9 * static_cast<double>(samples.back().time_ns - samples.front().time_ns) <
@@ -425,7 +425,7 @@ InertialInitialisation InitializeAtRest(const ImuBuffer& buffer, std::int64_t fr
 InertialInitialisation InitializeMoving(std::span<const TimedPose> poses,
                                         std::span<const Preintegration> motions,
                                         const InertialInitializerOptions& options) {
-  Check(options);
+  CheckOptions(options);
   InertialInitialisation result;
   if (poses.size() < static_cast<size_t>(options.min_poses)) return result;
   Check(poses, motions);

@@ -18,15 +18,15 @@ namespace sgf::vio {
 /// Why a body's first states are not known, or not believed.
 enum class InitialisationProblem {
   kNone,
-  kTooLittleData,
-  kGapInData,
-  kMoving,
-  kGyroscopeInDegrees,
-  kSensorAxes,
-  kGyroscopeBias,
-  kAccelerationInG,
-  kGravityMagnitude,
-  kMotionDisagrees
+  kTooLittleData,       ///< or too little motion in it for gravity and biases to be told apart
+  kGapInData,           ///< no measurements, or not all, of the time of the poses
+  kMoving,              ///< where rest was expected
+  kGyroscopeInDegrees,  ///< rates are about 180/pi times those of the poses
+  kSensorAxes,          ///< rotations do not fit those of the poses, whatever the bias
+  kGyroscopeBias,       ///< larger than max_gyro_bias
+  kAccelerationInG,     ///< gravity is about 1 where m/s^2 are expected
+  kGravityMagnitude,    ///< off by more than a tenth
+  kMotionDisagrees      ///< acceleration does not fit the motion of the poses
 };
 
 std::span<const std::pair<const char*, InitialisationProblem>> EnumNames(InitialisationProblem);
@@ -69,6 +69,9 @@ struct InertialInitializerOptions {
   }
 };
 
+/// @throws Error for an option out of range; it is named as that of the odometry, `start.`.
+void CheckOptions(const InertialInitializerOptions& options);
+
 /// First states, if there is no problem, and what was found on the way.
 struct InertialInitialisation {
   InitialisationProblem problem = InitialisationProblem::kTooLittleData;
@@ -89,7 +92,7 @@ struct InertialInitialisation {
 /// the mean acceleration up by the smallest rotation, which leaves yaw to chance. The
 /// accelerometer's bias is known along gravity only and zero across it; hence tilt_sd_rad.
 /// Motion at constant velocity and rate cannot be told from rest.
-/// @throws Error for options out of range.
+/// @throws Error as CheckOptions().
 InertialInitialisation InitializeAtRest(std::span<const ImuSample> samples,
                                         const InertialInitializerOptions& options = {});
 
@@ -107,7 +110,7 @@ InertialInitialisation InitializeAtRest(const ImuBuffer& buffer, std::int64_t fr
 /// @param poses T_visual_body in any metric frame at rest, in order of time.
 /// @param motions from each pose to the next. Large biases cost accuracy of second order: give the
 ///   result's biases to new ones, or the buffer to the function below.
-/// @throws Error for options out of range, and for motions that are not between the poses.
+/// @throws Error as CheckOptions(), and for motions that are not between the poses.
 InertialInitialisation InitializeMoving(std::span<const TimedPose> poses,
                                         std::span<const Preintegration> motions,
                                         const InertialInitializerOptions& options = {});

@@ -2,10 +2,8 @@
 #include <cmath>
 #include <set>
 
-#include <fmt/core.h>
-
-#include <sgf/core/error.h>
 #include <sgf/core/keyframe_choice.h>
+#include <sgf/core/require.h>
 #include <sgf/core/stopwatch.h>
 #include <sgf/vio/inertial_start.h>
 #include <sgf/vio/stereo_inertial_odometry.h>
@@ -23,30 +21,28 @@ ImuBias BiasOf(const BodyState& state) { return {state.gyro_bias, state.accel_bi
 void CheckOptions(const VioOptions& options) {
   flow::CheckOptions(options.flow);
   CheckOptions(options.window);
-  const auto require = [](bool valid, const char* option, double value, const char* range) {
-    if (!valid) throw Error(option, fmt::format("is {}; it has to be {}", value, range));
-  };
-  require(options.states >= 2 && options.states <= 10, "states", options.states, "from 2 to 10");
-  require(options.keyframes >= 2 && options.keyframes <= 30, "keyframes", options.keyframes,
+  CheckOptions(options.start);
+  Require(options.states >= 2 && options.states <= 10, "states", options.states, "from 2 to 10");
+  Require(options.keyframes >= 2 && options.keyframes <= 30, "keyframes", options.keyframes,
           "from 2 to 30");
-  require(options.keyframe_share > 0 && options.keyframe_share <= 1, "keyframe_share",
+  Require(options.keyframe_share > 0 && options.keyframe_share <= 1, "keyframe_share",
           options.keyframe_share, "in (0, 1]");
-  require(options.keyframe_gap >= 1, "keyframe_gap", options.keyframe_gap, "positive");
-  require(options.least_parallax > 0, "least_parallax", options.least_parallax, "positive");
-  require(options.least_sights >= 3, "least_sights", options.least_sights, "at least 3");
-  require(options.blind_s >= 0, "blind_s", options.blind_s, "at least 0");
-  require(options.start_s > 0, "start_s", options.start_s, "positive");
-  require(options.max_inertial_error > 0, "max_inertial_error", options.max_inertial_error,
+  Require(options.keyframe_gap >= 1, "keyframe_gap", options.keyframe_gap, "positive");
+  Require(options.least_parallax > 0, "least_parallax", options.least_parallax, "positive");
+  Require(options.least_sights >= 3, "least_sights", options.least_sights, "at least 3");
+  Require(options.blind_s >= 0, "blind_s", options.blind_s, "at least 0");
+  Require(options.start_s > 0, "start_s", options.start_s, "positive");
+  Require(options.max_inertial_error > 0, "max_inertial_error", options.max_inertial_error,
           "positive");
   const CalibrationOptions& calibration = options.calibration;
   constexpr double kMost_s = 0.05, kMost_rad = 0.2, kMost_m = 0.5;  // the start takes it as right
-  require(calibration.time_offset_sd_s >= 0 && calibration.time_offset_sd_s <= kMost_s,
+  Require(calibration.time_offset_sd_s >= 0 && calibration.time_offset_sd_s <= kMost_s,
           "calibration.time_offset_sd_s", calibration.time_offset_sd_s, "from 0 to 0.05");
-  require(calibration.rotation_sd_rad >= 0 && calibration.rotation_sd_rad <= kMost_rad,
+  Require(calibration.rotation_sd_rad >= 0 && calibration.rotation_sd_rad <= kMost_rad,
           "calibration.rotation_sd_rad", calibration.rotation_sd_rad, "from 0 to 0.2");
-  require(calibration.position_sd_m >= 0 && calibration.position_sd_m <= kMost_m,
+  Require(calibration.position_sd_m >= 0 && calibration.position_sd_m <= kMost_m,
           "calibration.position_sd_m", calibration.position_sd_m, "from 0 to 0.5");
-  require(options.threads >= 0, "threads", options.threads, "at least 0");
+  Require(options.threads >= 0, "threads", options.threads, "at least 0");
 }
 
 class StereoInertialOdometry::Impl {

@@ -126,16 +126,18 @@ struct VioFrameResult {
 struct VioPoint {
   std::int64_t host_ns = 0;                            ///< time of its key-frame
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< world, m
-  double inverse_depth = 0, inverse_depth_variance = 0;
-  int support = 0;  ///< sights in the window when it left
-  float grey = 0;
-  int segment = 0;
+  double inverse_depth = 0;           ///< along its key-frame's left optical axis, 1/m
+  double inverse_depth_variance = 0;  ///< 1/m^2
+  int support = 0;                    ///< sights in the window when it left
+  float grey = 0;                     ///< of its pixel in the left image, grey levels
+  int segment = 0;                    ///< number of its map
 };
 
 /// Odometry of a stereo camera and an inertial sensor. Frames are handed over one at a time; a
 /// frame's pose is not changed later, nor is its world: z points up as the accelerometer has it
 /// when a map begins, and where up is found to be later is said apart (R_gravity_world). Same
-/// input, same bits, for any number of threads. Memory does not grow with the sequence.
+/// input, same bits, for any number of threads. Memory does not grow with the sequence, but for
+/// points that nobody takes. Calls of one object must not overlap; objects share no state.
 class StereoInertialOdometry {
  public:
   /// @param rig raw cameras. @param T_body_left left camera's coordinates to the body's.

@@ -320,7 +320,7 @@ TEST_F(RunSemiDenseTest, NamesWhatIsWrongInTheExperiment) {
   EXPECT_THAT(MessageWith("right:", "left:"), EndsWith("experiment.yaml:5: unknown key 'left'"));
   EXPECT_THAT(MessageWith("metric: ugf", "metric: abc"),
               StartsWith("metric: 'abc' is unknown; known: "));
-  EXPECT_THAT(MessageWith("window: 5", "window: 4"), EndsWith("window: must be odd, got 4"));
+  EXPECT_THAT(MessageWith("window: 5", "window: 4"), EndsWith("window: is 4; it has to be odd"));
   EXPECT_THAT(MessageWith("min_gradient: 5", "min_gradient: -5"),
               EndsWith("min_gradient: must not be negative, got -5"));
   EXPECT_THAT(MessageWith("min_gradient: 5", "bad_pct: .nan"),

@@ -252,6 +252,9 @@ TEST(DirectOdometry, RefusesOptionsOutOfRange) {
   };
   EXPECT_THAT(refusal([](auto& o) { o.active_points = 1; }), HasSubstr("active_points"));
   EXPECT_THAT(refusal([](auto& o) { o.keyframes = 2; }), HasSubstr("keyframes"));
+  for (const double share : {-0.1, 1.1, std::nan("")})
+    EXPECT_THAT(refusal([&](auto& o) { o.keyframe_inliers = share; }),
+                HasSubstr("keyframe_inliers"));
   EXPECT_THAT(refusal([](auto& o) { o.lost_frames = 0; }), HasSubstr("lost_frames"));
   EXPECT_THAT(refusal([](auto& o) { o.depth.residual = "lssd"; }), HasSubstr("estimate depth"));
   Camera distorted = kCamera;

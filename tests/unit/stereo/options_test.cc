@@ -19,22 +19,23 @@ std::string MessageFor(const std::function<void(BlockMatcherOptions&)>& spoil) {
 TEST(BlockMatcherOptions, RejectsWhatIsOutOfRangeWithNameAndValue) {
   EXPECT_EQ(MessageFor([](auto&) {}), "no error");
   EXPECT_EQ(MessageFor([](auto& o) { o.num_disparities = 0; }),
-            "num_disparities: must be in [1, 2048], got 0");
+            "num_disparities: is 0; it has to be in [1, 2048]");
   EXPECT_EQ(MessageFor([](auto& o) { o.num_disparities = 5000; }),
-            "num_disparities: must be in [1, 2048], got 5000");
-  EXPECT_EQ(MessageFor([](auto& o) { o.window = 0; }), "window: must be in [1, 51], got 0");
-  EXPECT_EQ(MessageFor([](auto& o) { o.window = 8; }), "window: must be odd, got 8");
+            "num_disparities: is 5000; it has to be in [1, 2048]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.window = 0; }), "window: is 0; it has to be in [1, 51]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.window = 8; }), "window: is 8; it has to be odd");
   EXPECT_EQ(MessageFor([](auto& o) { o.uniqueness_pct = 100; }),
-            "uniqueness_pct: must be in [0, 99], got 100");
+            "uniqueness_pct: is 100; it has to be in [0, 99]");
   EXPECT_EQ(MessageFor([](auto& o) { o.left_right_max = -2; }),
-            "left_right_max: must be in [-1, 2047], got -2");
-  EXPECT_EQ(MessageFor([](auto& o) { o.tau = 0; }), "tau: must be in [1e-30, 1], got 0");
-  EXPECT_EQ(MessageFor([](auto& o) { o.threads = -1; }), "threads: must be in [0, 4096], got -1");
+            "left_right_max: is -2; it has to be in [-1, 2047]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.tau = 0; }), "tau: is 0; it has to be in [1e-30, 1]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.threads = -1; }),
+            "threads: is -1; it has to be in [0, 4096]");
   EXPECT_EQ(MessageFor([](auto& o) { o.prefilter_window = 4; }),
-            "prefilter_window: must be odd, got 4");
-  EXPECT_EQ(MessageFor([](auto& o) { o.pm.alpha = 2; }), "pm.alpha: must be in [0, 1], got 2");
+            "prefilter_window: is 4; it has to be odd");
+  EXPECT_EQ(MessageFor([](auto& o) { o.pm.alpha = 2; }), "pm.alpha: is 2; it has to be in [0, 1]");
   EXPECT_EQ(MessageFor([](auto& o) { o.epsilon.tile_px = 0; }),
-            "epsilon.tile_px: must be in [1, 1000000], got 0");
+            "epsilon.tile_px: is 0; it has to be in [1, 1000000]");
 }
 
 TEST(BlockMatcherOptions, AnUnknownMetricIsAnErrorThatListsTheKnownOnes) {

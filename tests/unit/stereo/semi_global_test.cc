@@ -364,18 +364,19 @@ std::string MessageFor(const std::function<void(SemiGlobalOptions&)>& spoil) {
 TEST(SemiGlobalOptions, RejectsWhatIsOutOfRangeWithNameAndValue) {
   EXPECT_EQ(MessageFor([](auto&) {}), "no error");
   EXPECT_EQ(MessageFor([](auto& o) { o.num_disparities = 0; }),
-            "num_disparities: must be in [1, 2048], got 0");
-  EXPECT_EQ(MessageFor([](auto& o) { o.window = 13; }), "window: must be in [1, 11], got 13");
-  EXPECT_EQ(MessageFor([](auto& o) { o.window = 4; }), "window: must be odd, got 4");
-  EXPECT_EQ(MessageFor([](auto& o) { o.p2 = 128; }), "p2: must be in [0, 127], got 128");
-  EXPECT_EQ(MessageFor([](auto& o) { o.p1 = 100, o.p2 = 99; }), "p1: must be in [0, 99], got 100");
-  EXPECT_EQ(MessageFor([](auto& o) { o.p1 = -1; }), "p1: must be in [0, 120], got -1");
+            "num_disparities: is 0; it has to be in [1, 2048]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.window = 13; }), "window: is 13; it has to be in [1, 11]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.window = 4; }), "window: is 4; it has to be odd");
+  EXPECT_EQ(MessageFor([](auto& o) { o.p2 = 128; }), "p2: is 128; it has to be in [0, 127]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.p1 = 100, o.p2 = 99; }),
+            "p1: is 100; it has to be in [0, 99]");
+  EXPECT_EQ(MessageFor([](auto& o) { o.p1 = -1; }), "p1: is -1; it has to be in [0, 120]");
   EXPECT_EQ(MessageFor([](auto& o) { o.uniqueness_pct = 100; }),
-            "uniqueness_pct: must be in [0, 99], got 100");
+            "uniqueness_pct: is 100; it has to be in [0, 99]");
   EXPECT_EQ(MessageFor([](auto& o) { o.left_right_max = -2; }),
-            "left_right_max: must be in [-1, 2047], got -2");
+            "left_right_max: is -2; it has to be in [-1, 2047]");
   EXPECT_EQ(MessageFor([](auto& o) { o.speckle_window = -1; }),
-            "speckle_window: must be in [0, 1000000000], got -1");
+            "speckle_window: is -1; it has to be in [0, 1000000000]");
   EXPECT_EQ(MessageFor([](auto& o) { o.metric = "lssd"; }),
             "metric: 'lssd' compares patches and cannot be a stereo cost");
 }

@@ -173,13 +173,16 @@ TEST(ImuBuffer, IsBoundedEvenIfNobodyDrops) {
 TEST(ImuBuffer, ReadsItsOptionsAndNamesTheOneAtFault) {
   ImuBufferOptions options;
   ReadOptions(YAML::Load("{max_gap_s: 0.3}"), options, "r.yaml");
-  EXPECT_THAT(ErrorMessage([&] { ImuBuffer({}, options); }), HasSubstr("max_bridge_s is 0.25"));
+  EXPECT_THAT(ErrorMessage([&] { ImuBuffer({}, options); }),
+              HasSubstr("imu.max_bridge_s: is 0.25"));
   options = {};
   options.gap_noise_factor = 0.5;
-  EXPECT_THAT(ErrorMessage([&] { ImuBuffer({}, options); }), HasSubstr("gap_noise_factor is 0.5"));
+  EXPECT_THAT(ErrorMessage([&] { ImuBuffer({}, options); }),
+              HasSubstr("imu.gap_noise_factor: is 0.5"));
   options = {};
   options.gyro_full_scale = std::nan("");
-  EXPECT_THAT(ErrorMessage([&] { ImuBuffer({}, options); }), HasSubstr("gyro_full_scale is nan"));
+  EXPECT_THAT(ErrorMessage([&] { ImuBuffer({}, options); }),
+              HasSubstr("imu.gyro_full_scale: is nan"));
   ImuNoise noise;
   noise.gyroscope_noise_density = -1;
   EXPECT_THAT(ErrorMessage([&] { ImuBuffer buffer(noise); }),

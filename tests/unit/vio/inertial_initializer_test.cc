@@ -308,10 +308,10 @@ TEST(InitializeMoving, NamesWhatIsWrong) {
   };
   InertialInitializerOptions options;
   ReadOptions(YAML::Load("{min_poses: 2}"), options, "r.yaml");
-  EXPECT_THAT(error(options), HasSubstr("min_poses is 2"));
+  EXPECT_THAT(error(options), HasSubstr("start.min_poses: is 2"));
   options = {};
   options.accel_bias_sd = 0;
-  EXPECT_THAT(error(options), HasSubstr("accel_bias_sd is 0"));
+  EXPECT_THAT(error(options), HasSubstr("start.accel_bias_sd: is 0"));
   std::swap(motions[3], motions[4]);
   EXPECT_THAT(error({}), HasSubstr("motion 3 is not from pose 3"));
   motions.pop_back();

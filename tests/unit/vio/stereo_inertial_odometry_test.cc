@@ -591,6 +591,11 @@ TEST(StereoInertialOdometry, RefusesOptionsOutOfRange) {
   EXPECT_THAT(refusal([](auto& o) { o.least_sights = 2; }), HasSubstr("least_sights"));
   EXPECT_THAT(refusal([](auto& o) { o.blind_s = -1; }), HasSubstr("blind_s"));
   EXPECT_THAT(refusal([](auto& o) { o.start_s = 0; }), HasSubstr("start_s"));
+  EXPECT_THAT(refusal([](auto& o) { o.start.min_rest_s = 0; }),
+              HasSubstr("start.min_rest_s: is 0"));
+  EXPECT_THAT(refusal([](auto& o) { o.start.max_motion_error = INFINITY; }),
+              HasSubstr("start.max_motion_error"));
+  EXPECT_THAT(refusal([](auto& o) { o.start.min_poses = 3; }), HasSubstr("start.min_poses"));
   EXPECT_THAT(refusal([](auto& o) { o.max_inertial_error = 0; }), HasSubstr("max_inertial_error"));
   EXPECT_THAT(refusal([](auto& o) { o.calibration.time_offset_sd_s = 0.06; }),
               HasSubstr("calibration.time_offset_sd_s"));
