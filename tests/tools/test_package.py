@@ -27,7 +27,7 @@ def output_of(*command):
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory):
     folder = tmp_path_factory.mktemp("prefix")
-    output_of("cmake", "--install", BUILD, "--prefix", folder)
+    output_of("cmake", "--install", BUILD, "--component", "libsgf-dev", "--prefix", folder)
     return folder
 
 
