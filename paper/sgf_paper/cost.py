@@ -1,4 +1,4 @@
-"""What the runs in a results folder have taken, as a table in Markdown: one line a rule, those it took most first.
+"""What the runs in a results folder have taken, as a table in Markdown: one line a kind of job, that of most time first.
 
 Time is that of processors, which does not depend on what else the machine did; memory is the largest run's.
 """
@@ -13,25 +13,31 @@ from statistics import mean
 
 from sgf_paper import paths
 
-HEADER = "| rule | runs | CPU s, mean | CPU s, most | CPU h, all | peak MiB |\n|---|---|---|---|---|---|\n"
+HEADER = "| job | runs | CPU s, mean | CPU s, most | CPU h, all | peak MiB |\n|---|---|---|---|---|---|\n"
+
+
+def kind_of(run: dict) -> str:
+    """Its rule and, if it made raw results, the sweep or experiment that they are of."""
+    folders = Path(next(iter(run["outputs"]), "")).parent.parts
+    return f"`{run['rule']}` {folders[1]}" if folders[:1] == ("raw",) and len(folders) > 1 else f"`{run['rule']}`"
 
 
 def read_timings(results: Path) -> dict[str, list[dict]]:
-    """The timings of all runs that ended well, by their rule."""
+    """The timings of all runs that ended well, by their kind."""
     found = defaultdict(list)
     for file in sorted(path for top in ("raw", "runs") for path in (results / top).rglob("timing.json")):
         node = json.loads(file.with_name("run.json").read_text())
         if node["exit"]["state"] == "done":
-            found[node["rule"]].append(json.loads(file.read_text()))
+            found[kind_of(node)].append(json.loads(file.read_text()))
     return found
 
 
 def cost_table(results: Path) -> str:
     lines = []
-    for rule, timings in read_timings(results).items():
+    for kind, timings in read_timings(results).items():
         cpu, peak = [t["cpu_s"] for t in timings], max(t["peak_mib"] for t in timings)
         numbers = f"{len(cpu)} | {mean(cpu):.1f} | {max(cpu):.1f} | {sum(cpu) / 3600:.3f} | {peak:.0f}"
-        lines.append((-sum(cpu), f"| `{rule}` | {numbers} |\n"))
+        lines.append((-sum(cpu), f"| {kind} | {numbers} |\n"))
     return HEADER + "".join(line for _, line in sorted(lines))
 
 

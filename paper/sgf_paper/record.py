@@ -118,10 +118,19 @@ def _output_of(*command: str | Path) -> str:
     return done.stdout if done.returncode == 0 else ""
 
 
+def _note_unknown(name: str) -> str:
+    """A line on a file that git does not know: its hash, or why it has none, which ends no run."""
+    try:
+        digest = hash_path(PROJECT / name, CACHE)
+    except OSError as error:
+        digest = error.strerror
+    return f"# not in git: {name} {digest}\n"
+
+
 def describe_code(diffs: Path) -> dict[str, str]:
     """Commit of the project and the hash of what differs from it, which is kept as <hash>.patch in `diffs`.
 
-    Files that git does not know count by name. Without git it is what the file REVISION says, which the Dockerfile
+    Files that git does not know count by name and hash. Without git it is what the file REVISION says, which the Dockerfile
     writes, or else `unknown`.
     """
     git = ("git", "-C", PROJECT)
@@ -130,8 +139,8 @@ def describe_code(diffs: Path) -> dict[str, str]:
         revision = PROJECT / "REVISION"
         return {"commit": revision.read_text().strip() if revision.exists() else "unknown", "diff": ""}
     diff = _output_of(*git, "diff", "--binary", "HEAD")
-    unknown = _output_of(*git, "ls-files", "--others", "--exclude-standard").splitlines()
-    diff += "".join(f"# not in git: {name}\n" for name in unknown)
+    unknown = _output_of(*git, "ls-files", "-z", "--others", "--exclude-standard").split("\0")[:-1]
+    diff += "".join(map(_note_unknown, unknown))
     if not diff:
         return {"commit": commit, "diff": ""}
     digest = hashlib.sha256(diff.encode()).hexdigest()

@@ -86,14 +86,19 @@ def test_submission_has_a_folder_for_what_jobs_print(tmp_path):
     assert os.path.isdir(tmp_path / "a b" / "logs" / "slurm")
 
 
-def test_costs_are_added_up_by_rule_those_of_most_time_first(tmp_path):
-    for index, (rule, cpu_s, state) in enumerate(
-        [("few", 3600, "done"), ("many", 2700, "done"), ("many", 1800, "done"), ("many", 9, "failed")]
-    ):
+def test_costs_are_added_up_by_rule_and_experiment_those_of_most_time_first(tmp_path):
+    for index, (rule, file, cpu_s, state) in enumerate([
+        ("few", "raw/fig1.csv", 3600, "done"),
+        ("many", "raw/stereo_bm/set/a.csv", 2700, "done"),
+        ("many", "raw/stereo_bm/set/b.csv", 1800, "done"),
+        ("many", "raw/stereo_bm/set/c.csv", 9, "failed"),
+        ("many", "raw/mesh/set/a.csv", 36, "done"),
+    ]):  # fmt: skip
         folder = tmp_path / "runs" / str(index)
-        record.write_json(folder / "run.json", {"rule": rule, "exit": {"state": state}})
+        record.write_json(folder / "run.json", {"rule": rule, "outputs": {file: ""}, "exit": {"state": state}})
         record.write_json(folder / "timing.json", {"cpu_s": cpu_s, "peak_mib": 100 + index})
     assert cost.cost_table(tmp_path).splitlines()[2:] == [
-        "| `many` | 2 | 2250.0 | 2700.0 | 1.250 | 102 |",
+        "| `many` stereo_bm | 2 | 2250.0 | 2700.0 | 1.250 | 102 |",
         "| `few` | 1 | 3600.0 | 3600.0 | 1.000 | 100 |",
+        "| `many` mesh | 1 | 36.0 | 36.0 | 0.010 | 104 |",
     ]

@@ -190,7 +190,13 @@ def test_the_code_is_a_commit_and_what_differs_from_it(tmp_path, monkeypatch):
     changed = record.describe_code(diffs)
     assert changed["commit"] == clean["commit"]
     patch = (diffs / f"{changed['diff']}.patch").read_text()
-    assert "+2\n" in patch and "# not in git: new\n" in patch
+    assert "+2\n" in patch and f"# not in git: new {hashlib.sha256(b'').hexdigest()}\n" in patch
+    (project / "new").write_text("3\n")
+    assert record.describe_code(diffs)["diff"] != changed["diff"], "what git does not know counts by what it holds"
+    (project / "new").unlink()
+    (project / "new").symlink_to("nowhere")
+    digest = record.describe_code(diffs)["diff"]
+    assert "# not in git: new No such file" in (diffs / f"{digest}.patch").read_text()
 
 
 def test_packages_are_those_of_the_programs_and_their_reports():
