@@ -130,8 +130,8 @@ def _note_unknown(name: str) -> str:
 def describe_code(diffs: Path) -> dict[str, str]:
     """Commit of the project and the hash of what differs from it, which is kept as <hash>.patch in `diffs`.
 
-    Files that git does not know count by name and hash. Without git it is what the file REVISION says, which the Dockerfile
-    writes, or else `unknown`.
+    Files that git does not know count by name and hash. Without git it is what the file REVISION says, which the
+    Dockerfile writes, or else `unknown`.
     """
     git = ("git", "-C", PROJECT)
     commit = _output_of(*git, "rev-parse", "HEAD").strip() if (PROJECT / ".git").exists() else ""
