@@ -455,7 +455,7 @@ TEST(StereoSgfSemiGlobal, ZerosStandForDefaults) {
 
 TEST(StereoSgfSemiGlobal, ThrowsForPenaltiesInTheUnitsOfStereoSgbm) {
   EXPECT_EQ(ErrorMessage([] { StereoSgfSemiGlobal::create(0, 16, 5, 8 * 25, 32 * 25); }),
-            "p2: must be in [0, 127], got 800");
+            "p2: is 800; it has to be in [0, 127]");
 }
 
 TEST(StereoSgfSemiGlobal, ThrowsForBadParametersAndImages) {
