@@ -65,7 +65,7 @@ def test_a_program_that_swaps_the_matcher_needs_what_matching_needs(prefix, tmp_
         ("REQUIRED COMPONENTS flow odometry", ["Ceres"], "found: core metrics stereo alignment odometry flow"),
         ("REQUIRED COMPONENTS vio", ["Ceres"], "sgf::vio needs Ceres::ceres"),
         ("REQUIRED COMPONENTS eval synth", ["OpenSSL"], "sgf::io needs OpenSSL::Crypto"),
-        ("REQUIRED COMPONENTS eval OPTIONAL_COMPONENTS vio", ["Ceres"], "found: core eval"),
+        ("REQUIRED COMPONENTS eval OPTIONAL_COMPONENTS vio", ["Ceres"], "found: core metrics eval alignment flow"),
         ("REQUIRED COMPONENTS stero", [], "There is no sgf::stero"),
     ],
 )
