@@ -6,6 +6,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -90,6 +91,28 @@ std::string KnownNames(T value) {
   return names;
 }
 
+/// The items of a list that a flag of a program or a line of an ini file gives as text, "1, 2" or
+/// "[1, 2]".
+inline YAML::Node ListOfText(std::string_view text) {
+  constexpr std::string_view kBlank = " \t";
+  const auto trim = [&](std::string_view t) {
+    const size_t first = std::min(t.find_first_not_of(kBlank), t.size());
+    return t.substr(first, t.find_last_not_of(kBlank) + 1 - first);
+  };
+  text = trim(text);
+  if (text.starts_with('[') && text.ends_with(']')) text = trim(text.substr(1, text.size() - 2));
+  YAML::Node list(YAML::NodeType::Sequence);
+  for (size_t begin = 0, end = 0; !text.empty() && end != std::string_view::npos; begin = end + 1) {
+    end = text.find(',', begin);
+    list.push_back(std::string(trim(text.substr(begin, end - begin))));
+  }
+  return list;
+}
+
+/// Whether a field is a list of plain values.
+template <class T>
+concept PlainList = std::is_same_v<T, std::vector<typename T::value_type>>;
+
 template <class T>
 void ParseValue(const YAML::Node& node, const std::string& key, const std::string& file, T& value) {
   if constexpr (std::is_enum_v<T>) {
@@ -102,7 +125,10 @@ void ParseValue(const YAML::Node& node, const std::string& key, const std::strin
     throw Error(At(file, node), fmt::format("{} is '{}'; known: {}", key, text, KnownNames(value)));
   } else {
     try {
-      value = node.as<T>();
+      if constexpr (PlainList<T>)
+        value = (node.IsScalar() ? ListOfText(node.Scalar()) : node).template as<T>();
+      else
+        value = node.as<T>();
     } catch (const YAML::Exception&) {
       throw Error(At(file, node),
                   fmt::format("cannot read '{}' as the value of {}", YAML::Dump(node), key));

@@ -126,6 +126,24 @@ TEST(Options, WritesAListOfOptionsAsItReadsIt) {
             "[{name: a, to_s: 2}, {name: b, to_s: .inf}]");
 }
 
+TEST(Options, ReadsListsThatFlagsGiveAsText) {
+  const auto sizes = [](const std::string& text) {
+    Outer options;
+    YAML::Node flags(YAML::NodeType::Map);
+    SetOption(flags, "sizes", text);
+    ReadOptions(flags, options, "command line");
+    return options.sizes;
+  };
+  using List = std::vector<int>;
+  EXPECT_EQ(sizes("3,4,5"), (List{3, 4, 5}));
+  EXPECT_EQ(sizes(" [3 , 4] "), (List{3, 4}));
+  EXPECT_EQ(sizes("3"), List{3});
+  EXPECT_EQ(sizes("[]"), List{});
+  EXPECT_EQ(sizes(""), List{});
+  for (const char* bad : {"3,", "3;4", "[3", "3]", "[[3]]", "a"})
+    EXPECT_THROW(sizes(bad), Error) << bad;
+}
+
 TEST(Options, NamesTheLineOfWhatIsWrongInAList) {
   EXPECT_EQ(MessageOf("items:\n  - name: a\n  - nam: b"), "run.yaml:3: unknown key 'nam'");
   EXPECT_EQ(MessageOf("items:\n  - to_s: late"),
