@@ -60,7 +60,7 @@ def test_both_formats_give_the_same_poses_and_times_to_the_nanosecond(write, tmp
         ("a.txt", f"1e999999 {POSE}", "the time '1e999999' is no time: 64 bits of nanoseconds do not hold it"),
         ("a.txt", f"1e5000 {POSE}", "the time '1e5000' is no time"),
         ("a.txt", f"-1e5000 {POSE}", "the time '-1e5000' is no time"),
-        ("a.csv", "1" * 4000 + ",1,2,3,1,0,0,0", "the time '1+' is no time"),
+        ("a.csv", "1" * 30 + ",1,2,3,1,0,0,0", "the time '1+' is no time"),
         ("a.txt", "3 1 2 x 0 0 0 1", "'x' is no finite number"),
         ("a.txt", "3 1 2 nan 0 0 0 1", "'nan' is no finite number"),
         ("a.txt", "3 1 2 3 0 0 0 0", "the quaternion's norm is 0"),

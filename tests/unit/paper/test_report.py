@@ -194,7 +194,7 @@ def earlier(tmp_path_factory):
     (root / "stages.tsv").write_text(f"fig5\tit failed\ntable1\t{EARLIER}\n")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report.shutil, "which", lambda name: None)
-        return root, html.unescape(make(root))
+        return root, make(root)
 
 
 def test_measured_on_the_papers_data_a_value_has_its_mark_beside_it(earlier):
@@ -226,7 +226,7 @@ def test_only_measured_values_of_table_3_are_marked(results):
 
 
 def test_what_is_there_of_an_earlier_run_is_said_to_be(earlier):
-    root, page = earlier
+    root, page = earlier[0], html.unescape(earlier[1])
     article = page.split('id="item-table1"')[1].split("</article>")[0]
     assert f"Of an earlier run: {EARLIER}." in article and "3.32 (3.29)" in article
     assert page.count(f": {EARLIER}.") == 2, "at the head of the page as well"
