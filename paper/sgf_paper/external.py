@@ -64,7 +64,7 @@ def _time_ns(text: str, is_csv: bool) -> int:
         time_s = Decimal("nan")
     if not time_s.is_finite():
         raise ValueError(f"the time '{text}' is no number of {'whole nanoseconds' if is_csv else 'seconds'}")
-    if abs(time_s) > LAST_S:
+    if time_s.copy_abs() > LAST_S:  # abs() would round, which such a time may not survive
         raise ValueError(f"the time '{text}' is no time: 64 bits of nanoseconds do not hold it")
     return int((time_s * NS).to_integral_value())
 
