@@ -10,7 +10,7 @@ Usage: tests/clean_room.sh [OPTION]... [STEP]...
 
 Steps, in this order; default: table1 alone with --suite smoke, else all:
   table1      ./reproduce.sh --only table1, in the image
-  run         ./reproduce.sh, in the image (20 minutes on two cores, beside the build, which the image has)
+  run         ./reproduce.sh, in the image (half an hour on two cores, without the build, which the image has)
   verify      ./reproduce.sh --verify, in the image, of what the steps before it have made (10 minutes)
   packages    makes the Debian packages in the image, installs them in a bare Debian and tries them there
   test        ./reproduce.sh test, in the image (half an hour and more)

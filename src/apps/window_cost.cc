@@ -1,11 +1,11 @@
 #include <sgf/apps/window_cost.h>
+#include <sgf/metrics/sample_image.h>
 
 namespace sgf::apps {
 
 SampleField::SampleField(const cv::Mat& grey, const SampleOptions& options)
     : rows_(grey.rows), cols_(grey.cols) {
-  if (!(options.tau >= 1e-30 && options.tau <= 1))
-    throw Error("tau", fmt::format("must be in [1e-30, 1], got {}", options.tau));
+  metrics::RequireTau(options.tau);
   const GradientImage gradient = ComputeGradient(grey, options.gradient);
   const cv::Mat1f epsilon = metrics::ComputeEpsilon(gradient, options.epsilon);
   cv::Mat1d intensity;

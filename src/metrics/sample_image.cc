@@ -1,6 +1,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/core/require.h>
 #include <sgf/metrics/sample_image.h>
 
 namespace sgf::metrics {
@@ -16,11 +17,6 @@ void RequireUsableIntensities(const cv::Mat& grey) {
                                      grey.at<float>(bad)));
 }
 
-void RequireTau(double tau) {
-  if (!(tau >= 1e-30 && tau <= 1))
-    throw Error("tau", fmt::format("must be in [1e-30, 1], got {}", tau));
-}
-
 void StoreSample(const Sample<float>& sample, int y, int x, SampleImage& image) {
   image.norm(y, x) = sample.norm;
   image.reg_norm(y, x) = sample.reg_norm;
@@ -30,6 +26,8 @@ void StoreSample(const Sample<float>& sample, int y, int x, SampleImage& image) 
 }
 
 }  // namespace
+
+void RequireTau(double tau) { RequireRange("tau", tau, 1e-30, 1); }
 
 SampleImage MakeSampleImage(const cv::Mat& grey, GradientOperator op, const EpsilonOptions& options,
                             double tau) {

@@ -24,6 +24,9 @@ struct SampleImage {
   }
 };
 
+/// @throws Error for a tau outside [1e-30, 1].
+void RequireTau(double tau);
+
 /// Samples of a one-channel image (8-bit, 16-bit or float): At(y, x) equals MakeSample<float> of
 /// the pixel's intensity, gradient and epsilon.
 /// @param tau see MakeSample.

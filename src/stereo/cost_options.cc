@@ -6,6 +6,7 @@
 #include <sgf/core/error.h>
 #include <sgf/core/require.h>
 #include <sgf/metrics/registry.h>
+#include <sgf/metrics/sample_image.h>
 #include <sgf/stereo/cost_options.h>
 
 namespace sgf::stereo {
@@ -37,7 +38,7 @@ void CheckCostOptions(const CostOptions& o) {
   RequireRange("pm.alpha", o.pm.alpha, 0, 1);
   RequireRange("pm.tau_c", o.pm.tau_c, 0, std::numeric_limits<double>::infinity());
   RequireRange("pm.tau_g", o.pm.tau_g, 0, std::numeric_limits<double>::infinity());
-  RequireRange("tau", o.tau, 1e-30, 1);
+  metrics::RequireTau(o.tau);
   RequireRange("threads", o.threads, 0, 4096);
 }
 

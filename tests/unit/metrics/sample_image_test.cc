@@ -84,9 +84,9 @@ std::string MessageFor(const cv::Mat& image, double tau) {
 
 TEST(SampleImage, NamesWhatItCannotWorkOn) {
   cv::Mat1f image = cv::Mat1f::zeros(4, 5);
-  EXPECT_EQ(MessageFor(image, 0), "tau: must be in [1e-30, 1], got 0");
-  EXPECT_EQ(MessageFor(image, 2), "tau: must be in [1e-30, 1], got 2");
-  EXPECT_EQ(MessageFor(image, std::nan("")), "tau: must be in [1e-30, 1], got nan");
+  EXPECT_EQ(MessageFor(image, 0), "tau: is 0; it has to be in [1e-30, 1]");
+  EXPECT_EQ(MessageFor(image, 2), "tau: is 2; it has to be in [1e-30, 1]");
+  EXPECT_EQ(MessageFor(image, std::nan("")), "tau: is nan; it has to be in [1e-30, 1]");
   EXPECT_EQ(MessageFor(cv::Mat(), kTau), "image: image is empty");
   EXPECT_EQ(MessageFor(cv::Mat(4, 4, CV_8UC3), kTau), "image: expected one channel, got 3");
   image(2, 3) = std::nanf("");

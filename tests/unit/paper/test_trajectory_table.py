@@ -261,3 +261,12 @@ def test_a_condition_under_which_everyone_fails_is_drawn(study, lines):
     assert all(set(line.get_ydata()) == {0} for axis in drawing.axes for line in axis.lines)
     drawing.canvas.draw()
     pyplot.close(drawing)
+
+
+@pytest.mark.parametrize("name", ["table3_dso", "table3_vio"])
+def test_the_comparisons_of_the_reference_are_those_of_its_runs(name):
+    study = config.load_experiment(name)
+    runs = pd.read_csv(paths.REFERENCE / f"{name}_runs.csv")
+    for end, compare in (("_compared", trajectory_table.compare), ("_ate_compared", trajectory_table.compare_errors)):
+        stated = pd.read_csv(paths.REFERENCE / f"{name}{end}.csv")
+        pd.testing.assert_frame_equal(compare(study, runs), stated, check_dtype=False, rtol=2e-3, atol=1e-4)
