@@ -57,6 +57,7 @@ def test_every_program_of_a_map_the_benchmark_and_the_report_are_on_record(proje
     converted = [node["command"] for node in runs.values() if node["rule"] == "mrpt_map_rawlog"]
     assert converted and all(command[command.index("-n") + 1].isdigit() for command in converted)
     (benchmark,) = [node for node in runs.values() if node["rule"] == "benchmark_run"]
+    assert benchmark["command"][:3] == ["/usr/bin/env", "-u", "GLIBC_TUNABLES"]  # timed as users run it
     assert any(word.startswith("SGF_BENCH_PAIR=/") for word in benchmark["command"])
     report = runs["runs/report.html"]
     assert {"tables/fig6.csv", "figures/fig6.png", "tables/bench_stereo.md"} <= set(report["inputs"])

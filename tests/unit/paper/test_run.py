@@ -34,3 +34,16 @@ def test_a_stage_that_failed_is_not_up_to_date(tmp_path):
     (tmp_path / "tables" / "sequences.csv").touch()
     line = summary.stage_lines(stage, tmp_path, 0, failed=True)[0]
     assert line.startswith("  sequences      FAILED; what is shown is of an earlier run: figures/sequences.png")
+
+
+def test_jobs_get_settings_of_their_own_unless_the_caller_has_set_them(tmp_path, monkeypatch):
+    for name in ("SOURCE_DATE_EPOCH", "GLIBC_TUNABLES"):
+        monkeypatch.delenv(name, raising=False)
+    ours = run.environment(tmp_path)
+    assert ours["SOURCE_DATE_EPOCH"] == "0"
+    assert ours["GLIBC_TUNABLES"] == "glibc.malloc.hugetlb=1"
+    monkeypatch.setenv("GLIBC_TUNABLES", "glibc.malloc.check=0")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/nowhere")
+    callers = run.environment(tmp_path)
+    assert callers["GLIBC_TUNABLES"] == "glibc.malloc.check=0"
+    assert callers["XDG_CACHE_HOME"].startswith(str(tmp_path))
