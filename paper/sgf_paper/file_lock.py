@@ -13,6 +13,7 @@ def take(file: Path, wait_s: float) -> int | None:
 
     @returns the open file that holds the lock, which the kernel drops when the last holder ends; None if another process
     holds it for as long as one waits
+    @throws OSError that names the file where it cannot be locked, as in folders of a network without locks
     """
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
     deadline = time.monotonic() + wait_s
@@ -20,8 +21,11 @@ def take(file: Path, wait_s: float) -> int | None:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return descriptor
-        except OSError:
+        except BlockingIOError:
             if time.monotonic() > deadline:
                 os.close(descriptor)
                 return None
+        except OSError as error:
+            os.close(descriptor)
+            raise OSError(error.errno, error.strerror, str(file)) from error
         time.sleep(0.1)

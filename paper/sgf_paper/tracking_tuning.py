@@ -201,7 +201,9 @@ def _held_out(tracker: Tracker, fold: int, defaults: Options, found: Options) ->
     runs = range(budget.runs, budget.runs + budget.held_out_runs)
     before = tracker.errors_pct(fold, runs, defaults)
     after = before if found == defaults else tracker.errors_pct(fold, runs, found)
-    ratio = paired.estimate_median(paired.ratios(after, before))
+    # Under both conditions a run begins at the same frame.
+    same_images = [(sequence, run) for sequence, _, run in tracker.cases(fold, runs)]
+    ratio = paired.estimate_ratio(after, before, same_images)
     return {
         "runs": len(before),
         "default": _summary(tracker.tuning, before),

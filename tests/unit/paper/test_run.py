@@ -1,4 +1,4 @@
-"""What a run says of stages that it could not make."""
+"""What a run says of stages that it could not make, and the environment of its jobs."""
 
 from pathlib import Path
 

@@ -183,6 +183,16 @@ def test_each_fold_is_scored_with_what_was_found_on_the_other(tracker, document)
         assert len(str(fold["parameters"]["flow.max_backward_px"])) <= 5, "as many digits as were run"
 
 
+def test_runs_under_both_conditions_are_drawn_together(tracker, tmp_path, monkeypatch):
+    def error_pct(tracker, sequence, condition, run, options):
+        return {"undisturbed": 1, "light": error_of(options) ** 4}[condition]
+
+    monkeypatch.setattr(Tracker, "error_pct", error_pct)
+    for fold in tracking_tuning.tune(tracker, tmp_path / "study.db")["folds"]:
+        ratio = fold["held_out"]["ratio"]
+        assert ratio["low"] == ratio["median"] == ratio["high"] < 1, "every first frame gains the same"
+
+
 def trials_of(tracker, storage, fold=0):
     study = tracking_tuning.open_study(storage, tracking_tuning.study_name(tracker, fold))
     return [(trial.params, trial.value) for trial in tracking_tuning.finished(study)]
