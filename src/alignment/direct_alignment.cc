@@ -24,6 +24,82 @@ constexpr int kBatch = 64;  // points whose sums are taken together, in order
 // Coarser levels converge less closely: the next one goes on.
 constexpr double kCoarseTolerance = 10;
 
+Vector2<float> PixelOf(const Camera& camera, const Input& input) {
+  return {static_cast<float>(camera.fx * input.ray.x() + camera.cx),
+          static_cast<float>(camera.fy * input.ray.y() + camera.cy)};
+}
+
+double MedianDepth(const std::vector<Input>& inputs) {
+  if (inputs.empty()) return 1;
+  std::vector<float> depths;
+  for (const Input& input : inputs) depths.push_back(input.inverse_depth);
+  const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
+  std::nth_element(depths.begin(), middle, depths.end());
+  return *middle > 0 ? 1 / *middle : 1;
+}
+
+/// Contributions of whole patches at the end, with P parameters.
+template <int P>
+struct Scatter {
+  using Matrix = Eigen::Matrix<double, P, P>;
+
+  NormalEquations<float, P> equations;
+  double weight = 0, curvature = 0;  ///< sums over residuals
+  Matrix scatter = Matrix::Zero();
+  int in_view = 0, inliers = 0;
+};
+
+template <int P>
+void SetCovariance(const Eigen::Matrix<double, P, P>& H, const Scatter<P>& total,
+                   double median_depth, AlignmentResult& result) {
+  Eigen::Matrix<double, P, 1> unit = Eigen::Matrix<double, P, 1>::Ones();
+  unit.template head<3>().setConstant(median_depth);
+  const auto scaled = (unit.asDiagonal() * H * unit.asDiagonal()).eval();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(
+      scaled.template topLeftCorner<6, 6>(), Eigen::EigenvaluesOnly);
+  const double least = eigen.eigenvalues()(0), most = eigen.eigenvalues()(5);
+  result.condition = least > 0 ? most / least : std::numeric_limits<double>::infinity();
+  if (!(result.condition < 1e15)) return;
+  // The cost's curvature, less than least squares has it; a redescending loss may even turn it
+  // negative where hardly anything fits.
+  constexpr double kLeastShare = 0.2;
+  const double share = std::clamp(total.curvature / total.weight, kLeastShare, 1.0);
+  const auto inverse = (share * H).inverse().eval();
+  result.covariance = (inverse * total.scatter * inverse).template topLeftCorner<6, 6>();
+}
+
+AlignmentFailure FailureOf(int in_view, const AlignmentOptions& options,
+                           const AlignmentResult& result) {
+  if (in_view < options.min_points) return AlignmentFailure::kFewPoints;
+  if (result.overlap < options.min_overlap) return AlignmentFailure::kLittleOverlap;
+  if (result.inlier_share < options.min_inlier_share) return AlignmentFailure::kFewInliers;
+  if (!(result.condition < options.max_condition) || !result.covariance.allFinite())
+    return AlignmentFailure::kIllConditioned;
+  return AlignmentFailure::kNone;
+}
+
+/// What an alignment is worth by the sums over its patches.
+/// @param points patches of the reference, in view or not.
+template <int P>
+void JudgeSums(const std::vector<Scatter<P>>& batches, size_t points, double median_depth,
+               const AlignmentOptions& options, AlignmentResult& result) {
+  Scatter<P> total;
+  NormalEquations<double, P> equations;
+  for (const Scatter<P>& batch : batches) {
+    equations += batch.equations;
+    total.weight += batch.weight;
+    total.curvature += batch.curvature;
+    total.scatter += batch.scatter;
+    total.in_view += batch.in_view;
+    total.inliers += batch.inliers;
+  }
+  result.mean_cost = equations.MeanCost();
+  result.overlap = points ? double(total.in_view) / double(points) : 0;
+  result.inlier_share = total.in_view ? double(total.inliers) / total.in_view : 0;
+  SetCovariance<P>(equations.H(), total, median_depth, result);
+  result.failure = FailureOf(total.in_view, options, result);
+}
+
 }  // namespace
 
 class DirectAligner::Engine {
@@ -42,6 +118,7 @@ class DirectAligner::EngineOf : public Engine {
   using Equations = NormalEquations<double, kParameters>;
   using BatchEquations = NormalEquations<float, kParameters>;
   using Row = typename NormalEquations<float, 6>::Row;
+  using PatchSums = Scatter<kParameters>;
   using ReferencePixel = typename Residual::template Reference<float>;
 
   /// Pixels of a level, patch after patch.
@@ -122,20 +199,6 @@ class DirectAligner::EngineOf : public Engine {
       return pyramid.bit_planes[level];
     else
       return pyramid.samples[level];
-  }
-
-  static Vector2<float> PixelOf(const Camera& camera, const Input& input) {
-    return {static_cast<float>(camera.fx * input.ray.x() + camera.cx),
-            static_cast<float>(camera.fy * input.ray.y() + camera.cy)};
-  }
-
-  static double MedianDepth(const std::vector<Input>& inputs) {
-    if (inputs.empty()) return 1;
-    std::vector<float> depths;
-    for (const Input& input : inputs) depths.push_back(input.inverse_depth);
-    const auto middle = depths.begin() + static_cast<ptrdiff_t>(depths.size() / 2);
-    std::nth_element(depths.begin(), middle, depths.end());
-    return *middle > 0 ? 1 / *middle : 1;
   }
 
   /// Coarser levels have room for fewer points.
@@ -284,17 +347,8 @@ class DirectAligner::EngineOf : public Engine {
     return total;
   }
 
-  /// Contributions of whole patches at the end.
-  struct Scatter {
-    BatchEquations equations;
-    double weight = 0, curvature = 0;  ///< sums over residuals
-    Eigen::Matrix<double, kParameters, kParameters> scatter =
-        Eigen::Matrix<double, kParameters, kParameters>::Zero();
-    int in_view = 0, inliers = 0;
-  };
-
   void AddToScatter(const ReferenceOf& reference, const Pyramid& current, const State& state,
-                    const RobustLoss<float>& loss, size_t first, Scatter& sum) const {
+                    const RobustLoss<float>& loss, size_t first, PatchSums& sum) const {
     const Level& level = reference.levels[0];
     BatchEquations patch;
     RobustCost<float> cost(loss);
@@ -330,51 +384,11 @@ class DirectAligner::EngineOf : public Engine {
 
   void Judge(const ReferenceOf& reference, const Pyramid& current, const State& state,
              const RobustLoss<float>& loss, AlignmentResult& result) const {
-    Scatter total;
-    Equations equations;
-    for (const Scatter& batch :
-         OverPatches<Scatter>(reference.levels[0], [&](size_t first, Scatter&sum) {
-           AddToScatter(reference, current, state, loss, first, sum);
-         })) {
-      equations += batch.equations;
-      total.weight += batch.weight;
-      total.curvature += batch.curvature;
-      total.scatter += batch.scatter;
-      total.in_view += batch.in_view;
-      total.inliers += batch.inliers;
-    }
-    result.mean_cost = equations.MeanCost();
-    result.overlap = reference.points ? double(total.in_view) / double(reference.points) : 0;
-    result.inlier_share = total.in_view ? double(total.inliers) / total.in_view : 0;
-    SetCovariance(equations.H(), total, reference.median_depth, result);
-    result.failure = FailureOf(total.in_view, result);
-  }
-
-  void SetCovariance(const Eigen::Matrix<double, kParameters, kParameters>& H, const Scatter& total,
-                     double median_depth, AlignmentResult& result) const {
-    Eigen::Matrix<double, kParameters, 1> unit = Eigen::Matrix<double, kParameters, 1>::Ones();
-    unit.template head<3>().setConstant(median_depth);
-    const auto scaled = (unit.asDiagonal() * H * unit.asDiagonal()).eval();
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(
-        scaled.template topLeftCorner<6, 6>(), Eigen::EigenvaluesOnly);
-    const double least = eigen.eigenvalues()(0), most = eigen.eigenvalues()(5);
-    result.condition = least > 0 ? most / least : std::numeric_limits<double>::infinity();
-    if (!(result.condition < 1e15)) return;
-    // The cost's curvature, less than least squares has it; a redescending loss may even turn it
-    // negative where hardly anything fits.
-    constexpr double kLeastShare = 0.2;
-    const double share = std::clamp(total.curvature / total.weight, kLeastShare, 1.0);
-    const auto inverse = (share * H).inverse().eval();
-    result.covariance = (inverse * total.scatter * inverse).template topLeftCorner<6, 6>();
-  }
-
-  AlignmentFailure FailureOf(int in_view, const AlignmentResult& result) const {
-    if (in_view < options_.min_points) return AlignmentFailure::kFewPoints;
-    if (result.overlap < options_.min_overlap) return AlignmentFailure::kLittleOverlap;
-    if (result.inlier_share < options_.min_inlier_share) return AlignmentFailure::kFewInliers;
-    if (!(result.condition < options_.max_condition) || !result.covariance.allFinite())
-      return AlignmentFailure::kIllConditioned;
-    return AlignmentFailure::kNone;
+    const std::vector<PatchSums> batches =
+        OverPatches<PatchSums>(reference.levels[0], [&](size_t first, PatchSums&sum) {
+          AddToScatter(reference, current, state, loss, first, sum);
+        });
+    JudgeSums<kParameters>(batches, reference.points, reference.median_depth, options_, result);
   }
 
   Camera camera_;

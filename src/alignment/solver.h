@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <utility>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 /// Gauss-Newton and Levenberg-Marquardt, once for all warps.
@@ -122,68 +122,61 @@ class StepLength {
   bool taken_ = false;
 };
 
-namespace solver_internal {
-
-/// Step of the damped normal equations.
+/// The course of a minimisation over P parameters: proposes steps and judges where they end. It
+/// knows neither what is minimised nor the state, so it is compiled once for each P, in solver.cc.
 template <int P>
-Eigen::Matrix<double, P, 1> Step(const NormalEquations<double, P>& equations, double damping) {
-  Eigen::Matrix<double, P, P> H = equations.H();
-  H.diagonal() *= 1 + damping;
-  H.diagonal().array() += 1e-12 * H.diagonal().maxCoeff();  // a direction without any gradient
-  return -H.ldlt().solve(equations.b());
-}
+class Descent {
+ public:
+  using Equations = NormalEquations<double, P>;
+  using Parameters = Eigen::Matrix<double, P, 1>;
 
-}  // namespace solver_internal
+  Descent(const SolverOptions& options, const Equations& at_start);
+
+  /// The step to try next; none at the end.
+  std::optional<Parameters> NextStep();
+
+  /// Whether the step stays: Levenberg-Marquardt takes it back where the mean cost has risen or too
+  /// few residuals stay in view.
+  /// @param equations at its end.
+  bool Keep(const Equations& equations);
+
+  const Equations& equations() const { return last_; }  ///< where it stands
+  const SolverSummary& summary() const { return summary_; }
+
+ private:
+  SolverOptions options_;
+  bool damped_;
+  double damping_;
+  Equations last_;
+  int most_in_view_;
+  Parameters step_ = Parameters::Zero(), full_ = Parameters::Zero();  // tried; of Gauss-Newton
+  StepLength<P> length_;
+  SolverSummary summary_;
+};
+
+extern template class Descent<1>;
+extern template class Descent<2>;
+extern template class Descent<3>;
+extern template class Descent<4>;
+extern template class Descent<6>;
+extern template class Descent<8>;
 
 /// Minimises from `state`. Linearises once an iteration: a step is judged by the linearisation at
-/// its end, and taken back where the mean cost has risen or too few residuals stay in view
-/// (Levenberg-Marquardt).
+/// its end.
+/// @tparam P 1, 2, 3, 4, 6 or 8.
 /// @param linearize state -> NormalEquations<double, P>.
 /// @param update (state, Parameters) -> the state after a step.
 /// @param[out] last normal equations at the final state.
 template <int P, class State, class Linearize, class Update>
 SolverSummary Minimize(State& state, const Linearize& linearize, const Update& update,
                        const SolverOptions& options, NormalEquations<double, P>& last) {
-  constexpr double kLeastInView = 0.7;  // the mean must not fall by looking away
-  constexpr double kFirstDamping = 1e-4, kLeastDamping = 1e-7, kMostDamping = 1e4;
-  constexpr double kDampingAfterRise = 1;  // half the step: one little shorter would rise as well
-  using Parameters = Eigen::Matrix<double, P, 1>;
-  const bool damped = options.method == SolverMethod::kLevenbergMarquardt;
-  double damping = damped ? kFirstDamping : 0;
-  SolverSummary summary;
-  last = linearize(state);
-  int most_in_view = last.residuals();
-  StepLength<P> length;
-  while (summary.iterations < options.max_iterations && last.residuals() > 0) {
-    const Parameters full = solver_internal::Step(last, 0);
-    const Parameters delta = solver_internal::Step(last, damping);
-    if (!full.allFinite() || !delta.allFinite()) break;
-    const double promised = -0.5 * last.b().dot(delta);
-    ++summary.iterations;
-    if (!(promised > options.tolerance * last.cost())) {
-      summary.converged = promised >= 0;
-      break;
-    }
-    const Parameters step = damped ? length.Next(last.H(), last.b()) * delta : delta;
-    State next = update(state, step);
-    NormalEquations<double, P> equations = linearize(next);
-    const bool in_view = equations.residuals() >= kLeastInView * most_in_view;
-    if (damped && !(in_view && equations.MeanCost() <= last.MeanCost())) {
-      length.Reset();
-      damping = std::max(damping * 10, kDampingAfterRise);
-      if (damping > kMostDamping) {
-        summary.converged = true;  // no step lowers the cost
-        break;
-      }
-      continue;
-    }
-    damping = damped ? std::max(damping / 10, kLeastDamping) : 0;
-    length.Take(step, full);
-    state = std::move(next);
-    last = std::move(equations);
-    most_in_view = std::max(most_in_view, last.residuals());
+  Descent<P> descent(options, linearize(state));
+  while (const auto step = descent.NextStep()) {
+    State next = update(state, *step);
+    if (descent.Keep(linearize(next))) state = std::move(next);
   }
-  return summary;
+  last = descent.equations();
+  return descent.summary();
 }
 
 }  // namespace sgf::alignment
