@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <support/corner_world.h>
