@@ -40,17 +40,17 @@ double MedianDepth(const std::vector<Input>& inputs) {
 
 /// Contributions of whole patches at the end, with P parameters.
 template <int P>
-struct Scatter {
-  using Matrix = Eigen::Matrix<double, P, P>;
-
+struct PatchSums {
   NormalEquations<float, P> equations;
   double weight = 0, curvature = 0;  ///< sums over residuals
-  Matrix scatter = Matrix::Zero();
+  Eigen::Matrix<double, P, P> scatter = Eigen::Matrix<double, P, P>::Zero();  ///< of gradients b
   int in_view = 0, inliers = 0;
 };
 
+/// Sets the condition and, unless that is hopeless, the pose's covariance: the patches' scatter
+/// between inverse curvatures, for which residuals of one patch need not be independent.
 template <int P>
-void SetCovariance(const Eigen::Matrix<double, P, P>& H, const Scatter<P>& total,
+void SetCovariance(const Eigen::Matrix<double, P, P>& H, const PatchSums<P>& total,
                    double median_depth, AlignmentResult& result) {
   Eigen::Matrix<double, P, 1> unit = Eigen::Matrix<double, P, 1>::Ones();
   unit.template head<3>().setConstant(median_depth);
@@ -81,11 +81,11 @@ AlignmentFailure FailureOf(int in_view, const AlignmentOptions& options,
 /// What an alignment is worth by the sums over its patches.
 /// @param points patches of the reference, in view or not.
 template <int P>
-void JudgeSums(const std::vector<Scatter<P>>& batches, size_t points, double median_depth,
+void JudgeSums(const std::vector<PatchSums<P>>& batches, size_t points, double median_depth,
                const AlignmentOptions& options, AlignmentResult& result) {
-  Scatter<P> total;
+  PatchSums<P> total;
   NormalEquations<double, P> equations;
-  for (const Scatter<P>& batch : batches) {
+  for (const PatchSums<P>& batch : batches) {
     equations += batch.equations;
     total.weight += batch.weight;
     total.curvature += batch.curvature;
@@ -118,7 +118,7 @@ class DirectAligner::EngineOf : public Engine {
   using Equations = NormalEquations<double, kParameters>;
   using BatchEquations = NormalEquations<float, kParameters>;
   using Row = typename NormalEquations<float, 6>::Row;
-  using PatchSums = Scatter<kParameters>;
+  using Sums = PatchSums<kParameters>;
   using ReferencePixel = typename Residual::template Reference<float>;
 
   /// Pixels of a level, patch after patch.
@@ -347,8 +347,8 @@ class DirectAligner::EngineOf : public Engine {
     return total;
   }
 
-  void AddToScatter(const ReferenceOf& reference, const Pyramid& current, const State& state,
-                    const RobustLoss<float>& loss, size_t first, PatchSums& sum) const {
+  void AddToSums(const ReferenceOf& reference, const Pyramid& current, const State& state,
+                    const RobustLoss<float>& loss, size_t first, Sums& sum) const {
     const Level& level = reference.levels[0];
     BatchEquations patch;
     RobustCost<float> cost(loss);
@@ -384,9 +384,9 @@ class DirectAligner::EngineOf : public Engine {
 
   void Judge(const ReferenceOf& reference, const Pyramid& current, const State& state,
              const RobustLoss<float>& loss, AlignmentResult& result) const {
-    const std::vector<PatchSums> batches =
-        OverPatches<PatchSums>(reference.levels[0], [&](size_t first, PatchSums&sum) {
-          AddToScatter(reference, current, state, loss, first, sum);
+    const std::vector<Sums> batches =
+        OverPatches<Sums>(reference.levels[0], [&](size_t first, Sums&sum) {
+          AddToSums(reference, current, state, loss, first, sum);
         });
     JudgeSums<kParameters>(batches, reference.points, reference.median_depth, options_, result);
   }

@@ -149,7 +149,8 @@ class Descent {
   double damping_;
   Equations last_;
   int most_in_view_;
-  Parameters step_ = Parameters::Zero(), full_ = Parameters::Zero();  // tried; of Gauss-Newton
+  Parameters step_ = Parameters::Zero();  // that is tried
+  Parameters full_ = Parameters::Zero();  // Gauss-Newton's from the same place
   StepLength<P> length_;
   SolverSummary summary_;
 };
