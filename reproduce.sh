@@ -98,11 +98,10 @@ packages_of() {
 
 # missing_packages SECTION...: those of them that are not installed.
 missing_packages() {
-  local package
-  for package in $(packages_of "$@"); do
-    [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] ||
-      printf '%s\n' "$package"
-  done
+  local -a wanted
+  mapfile -t wanted < <(packages_of "$@")
+  printf '%s\n' "${wanted[@]}" | grep -vxFf \
+    <(dpkg-query -W -f '${db:Status-Status} ${Package}\n' "${wanted[@]}" 2>/dev/null | sed -n 's/^installed //p') || true
 }
 
 # print_manual_install PACKAGE...: what to do without the right to install.
@@ -241,7 +240,9 @@ run_experiments() {
 }
 
 run_tests() {
-  install_packages run report test
+  local -a sections=(run report test)
+  [[ $preset != sanitize ]] || sections+=(sanitize)
+  install_packages "${sections[@]}"
   echo "== build"
   configure "$preset" ON
   build "$preset"

@@ -31,10 +31,15 @@ if(SGF_BUILD_FUZZERS)
 endif()
 
 function(sgf_compile_options target)
+  if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    # Of what only the main file sees GCC does not warn, but takes the files that are compiled as one for headers.
+    target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
+  endif()
   # Same input, same bits: no contraction to fused multiply-add. errno and floating-point traps are
   # never looked at, and both only block vectorisation; neither flag changes a value.
   target_compile_options(${target} PRIVATE
     -Wall -Wextra -Wpedantic -Wshadow -ffp-contract=off -fno-math-errno -fno-trapping-math
+    $<$<CXX_COMPILER_ID:Clang>:-Wno-unknown-pragmas> # GCC ivdep
     $<$<BOOL:${SGF_WARNINGS_AS_ERRORS}>:-Werror>
     ${sanitizers} $<$<BOOL:${SGF_SANITIZE}>:-fno-omit-frame-pointer>)
   target_compile_definitions(${target} PRIVATE $<$<BOOL:${SGF_SANITIZE}>:_GLIBCXX_ASSERTIONS>)
@@ -65,13 +70,22 @@ function(sgf_precompile_headers target)
   target_precompile_headers(${target} REUSE_FROM ${headers})
 endfunction()
 
-# sgf_library(NAME SOURCES file... [DEPENDS target...] [PRIVATE_DEPENDS target...])
+# The presets compile up to eight files of a target as one (CMAKE_UNITY_BUILD), as most of the time goes into the
+# same headers and templates. SEPARATE lists sources whose own names clash with those of others; they stay apart.
+function(sgf_sources target)
+  cmake_parse_arguments(ARG "" "" "SOURCES;SEPARATE" ${ARGN})
+  target_sources(${target} PRIVATE ${ARG_SOURCES} ${ARG_SEPARATE})
+  set_source_files_properties(${ARG_SEPARATE} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
+# sgf_library(NAME SOURCES file... [SEPARATE file...] [DEPENDS target...] [PRIVATE_DEPENDS target...])
 # makes library libsgf_NAME, used as sgf::NAME, from the calling folder and installs its headers. (The
 # target's own name is another, since programs such as sgf_stereo are targets too.)
 function(sgf_library name)
-  cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "" "SOURCES;SEPARATE;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   set(target sgf_library_${name})
-  add_library(${target} STATIC ${ARG_SOURCES})
+  add_library(${target} STATIC)
+  sgf_sources(${target} SOURCES ${ARG_SOURCES} SEPARATE ${ARG_SEPARATE})
   add_library(sgf::${name} ALIAS ${target})
   sgf_compile_options(${target})
   target_include_directories(${target} PUBLIC
@@ -100,18 +114,19 @@ function(sgf_app name)
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT sgf-tools)
 endfunction()
 
-# sgf_test(NAME SOURCES file... [DEPENDS target...] [LABELS label...] [TIMEOUT seconds])
+# sgf_test(NAME SOURCES file... [SEPARATE file...] [DEPENDS target...] [LABELS label...] [TIMEOUT seconds])
 # makes GoogleTest executable NAME and registers it with CTest as one test. Without other labels it
 # is a unit test. Target unit_tests builds all unit tests that are not also labelled slow.
 function(sgf_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;DEPENDS;LABELS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT" "SOURCES;SEPARATE;DEPENDS;LABELS" ${ARGN})
   if(NOT ARG_LABELS)
     set(ARG_LABELS unit)
   endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 300)
   endif()
-  add_executable(${name} ${ARG_SOURCES})
+  add_executable(${name})
+  sgf_sources(${name} SOURCES ${ARG_SOURCES} SEPARATE ${ARG_SEPARATE})
   sgf_compile_options(${name})
   sgf_precompile_headers(${name})
   target_include_directories(${name} PRIVATE "${PROJECT_SOURCE_DIR}/tests")

@@ -75,7 +75,15 @@ def load_experiment(name: str) -> Experiment:
     return build(KINDS[kind].type, node, where)
 
 
+def load_all() -> dict[str, dict[str, Any]]:
+    """All experiments by kind and name; none of a kind that has none."""
+    every: dict[str, dict[str, Any]] = {kind: {} for kind in KINDS}
+    for path in sorted(paths.EXPERIMENTS.glob("*.yaml")):
+        experiment = load_experiment(path.stem)
+        every[experiment.kind][experiment.name] = experiment
+    return every
+
+
 def load_experiments(kind: str) -> dict[str, Any]:
     """All experiments of one kind by name."""
-    every = (load_experiment(path.stem) for path in sorted(paths.EXPERIMENTS.glob("*.yaml")))
-    return {experiment.name: experiment for experiment in every if experiment.kind == kind}
+    return load_all()[kind]

@@ -13,8 +13,6 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-import pandas as pd
-
 from sgf_paper import config, odometry_scores
 from sgf_paper.strict_yaml import ConfigError
 from sgf_paper.tracking_config import JoinedTable, TableSequence, image_times_ns, load_external_system
@@ -201,6 +199,8 @@ def main() -> None:
         line = Scorer(joined, a.program, a.suite, a.data).score(path)
     except (ExternalError, odometry_scores.ScoresError, ConfigError) as error:
         raise SystemExit(f"Error: {error}") from None
+    import pandas as pd  # late: the Snakefile, which imports this module, need not wait for it
+
     pd.DataFrame([line]).to_csv(a.out, index=False)
 
 

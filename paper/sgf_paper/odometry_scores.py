@@ -13,13 +13,14 @@ import subprocess
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from sgf_paper import config
 from sgf_paper.strict_yaml import ConfigError
 from sgf_paper.tracking_config import RepeatedRuns
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # What sgf_eval calls the errors that are kept, at common times and of all poses of a run.
 ERRORS = {
@@ -125,6 +126,8 @@ def score(study: RepeatedRuns, sequence: str, folder: Path, runs: Path, program:
     @param folder of the sequence. @param program sgf_eval.
     @param runs folder with a folder per condition, in it one per column.
     """
+    import pandas as pd  # late: what imports this module for the rest need not wait for it
+
     scorer = Scorer(study, program, folder)
     every = [
         read_run(study, runs, condition, column)

@@ -7,12 +7,12 @@ of them for a verdict.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 RESAMPLES = 2000
 SEED = 1
@@ -104,14 +104,15 @@ def compare_success(
     a, b = np.asarray(own, dtype=bool), np.asarray(of_baseline, dtype=bool)
     only_own, only_baseline = int((a & ~b).sum()), int((b & ~a).sum())
     differing = only_own + only_baseline
-    p = stats.binomtest(only_own, differing).pvalue if differing else 1.0
+    tail = sum(math.comb(differing, k) for k in range(min(only_own, only_baseline) + 1))
+    p = min(1.0, 2 * tail / 2**differing)
     of_pair = pd.DataFrame({"gain": a.astype(int) - b, "pairs": 1})
     of_cluster = of_pair.groupby(pd.Series(list(clusters))).sum().to_numpy()
     gain, pairs = of_cluster[_resample(len(of_cluster))].sum(axis=1).T
     low, high = quantiles(100 * gain / pairs, ENDS)
     difference_pct = 100 * (only_own - only_baseline) / a.size
     return SuccessDifference(
-        a.size, int((a & b).sum()), only_own, only_baseline, difference_pct, low, high, float(p)
+        a.size, int((a & b).sum()), only_own, only_baseline, difference_pct, low, high, p
     )
 
 

@@ -13,6 +13,7 @@ from sgf_paper import text
 from sgf_paper.tracking_config import RepeatedRuns
 
 KEYS = ["sequence", "condition", "column"]
+ALL = "all"  # in place of a sequence: all of them together
 LENGTHS = ["ate", "ate_mean", "rpe_half_second", "rpe_one_second"]
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from sgf_paper import bench, catalog, config, text, trajectory_table
+from sgf_paper import bench, catalog, config, repeated_runs, text
 from sgf_paper.catalog import Source
 from sgf_paper.config import KINDS
 from sgf_paper.experiment import Experiment
@@ -188,7 +188,7 @@ def _trajectory_table_lines(path: Path, verdict_runs: int) -> list[str]:
     lines += [
         f"{row.condition}, ATE of {row.column} over that of {row.baseline}, {row.pairs} pairs of runs:"
         f" {text.format_estimate(row.ratio, row.ratio_low, row.ratio_high, 2)}, {row.verdict}"
-        for row in errors[errors["sequence"] == trajectory_table.ALL].itertuples()
+        for row in errors[errors["sequence"] == repeated_runs.ALL].itertuples()
     ]
     return lines + _odometry_lines(path, "failed")
 

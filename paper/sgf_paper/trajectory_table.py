@@ -11,7 +11,7 @@ import pandas as pd
 
 from sgf_paper import config, paired, repeated_runs, style, text
 from sgf_paper.deviations import load_deviations
-from sgf_paper.repeated_runs import KEYS
+from sgf_paper.repeated_runs import ALL, KEYS
 from sgf_paper.style import plt
 from sgf_paper.tracking_config import TrajectoryTable, load_published_trajectories
 
@@ -28,7 +28,6 @@ LINE = [
     "ate_mean_mm", "ate_mean_low_mm", "ate_mean_high_mm", "ate_mean_of_successes_mm", "published_mm",
     "rpe_one_second_mm", "rpe_one_second_deg", "orientation_deg",
 ]  # fmt: skip
-ALL = "all"  # sequences together
 COMPARED_ERRORS = [
     "sequence", "condition", "column", "baseline", "pairs", "both_failed", "ratio", "ratio_low", "ratio_high",
     "verdict",

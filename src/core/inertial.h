@@ -19,6 +19,11 @@ struct ImuNoise {
   double accelerometer_random_walk = 3.0000e-3;    ///< m/s^3/sqrt(Hz)
 };
 
+/// Time from one moment to another, s.
+inline double Seconds(std::int64_t from_ns, std::int64_t to_ns) {
+  return 1e-9 * static_cast<double>(to_ns - from_ns);
+}
+
 /// One measurement of an inertial sensor, in body coordinates.
 struct ImuSample {
   std::int64_t time_ns = 0;

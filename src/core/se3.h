@@ -28,6 +28,11 @@ inline Eigen::Vector3d LogSO3(const Eigen::Quaterniond& q) {
   return sign * scale * q.vec();
 }
 
+/// Smallest rotation that takes the direction of `from` to that of `to`; of opposite ones, a half
+/// turn. Defined apart, as Eigen's treatment of opposite directions takes a singular value
+/// decomposition and seconds to compile.
+Eigen::Quaterniond RotationBetween(const Eigen::Vector3d& from, const Eigen::Vector3d& to);
+
 /// The matrix of the cross product with w: HatSO3(w) x = w.cross(x).
 inline Eigen::Matrix3d HatSO3(const Eigen::Vector3d& w) {
   Eigen::Matrix3d m;

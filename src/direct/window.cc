@@ -188,6 +188,10 @@ class WindowOptimizer::Engine {
   }
 
  private:
+  static auto FrameOf(VectorXd& x, size_t k) {
+    return x.segment<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
+  }
+
   /// Parameter blocks of a window: its key-frames and maybe the camera.
   size_t Blocks(const Window& window) const { return window.size() + (refines_camera_ ? 1 : 0); }
 
@@ -244,10 +248,6 @@ class WindowOptimizer::Engine {
   /// Items of a pair are worked on together: they wait for the same image.
   std::pair<int, int> PairOf(int item) const {
     return {items_[item].target, points_[items_[item].point].host};
-  }
-
-  static auto FrameOf(VectorXd& x, size_t k) {
-    return x.segment<kFrameParameters>(kFrameParameters * static_cast<Eigen::Index>(k));
   }
 
   /// Takes on the key-frames' parameters, and the inverse depths that go with them.

@@ -13,7 +13,6 @@
 namespace sgf {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kSameTime_ns = 1000;
 constexpr size_t kMinPoses = 3;
 constexpr double kMaxSuccess_m = 1.5, kMedianSuccess_m = 0.1;
@@ -188,7 +187,8 @@ void ScoreCoverage(std::span<const TimedPose> estimate, std::span<const TimedPos
 TrajectoryScores NoScores() {
   TrajectoryScores scores;
   const auto clear = [](auto& value) {
-    if constexpr (std::is_same_v<decltype(value), double&>) value = kNan;
+    if constexpr (std::is_same_v<decltype(value), double&>)
+      value = std::numeric_limits<double>::quiet_NaN();
   };
   scores.VisitFields([&](const char*, auto& value, const char*, const char*) {
     if constexpr (std::is_class_v<std::remove_reference_t<decltype(value)>>)

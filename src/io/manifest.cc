@@ -12,6 +12,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <sgf/core/error.h>
+#include <sgf/io/absolute_path.h>
 #include <sgf/io/atomic_file.h>
 #include <sgf/io/hash.h>
 #include <sgf/io/manifest.h>
@@ -147,12 +148,6 @@ void Rename(const fs::path& from, const fs::path& to) {
 
 fs::path WithSuffix(fs::path path, const char* suffix) { return path += suffix; }
 
-// Without a '.' or '/' at the end, to which no suffix can be added.
-fs::path Normal(const fs::path& path) {
-  const fs::path normal = fs::absolute(path).lexically_normal();
-  return normal.has_filename() ? normal : normal.parent_path();
-}
-
 void RemoveContent(const fs::path& folder) try {
   for (const auto& entry : fs::directory_iterator(folder)) RemoveAll(entry.path());
 } catch (const fs::filesystem_error& error) {
@@ -240,7 +235,9 @@ void FolderLock::Close() {
 }
 
 StagedFolder::StagedFolder(const fs::path& target)
-    : target_(Normal(target)), partial_(WithSuffix(target_, ".partial")), lock_(partial_) {
+    : target_(internal::AbsolutePath(target)),
+      partial_(WithSuffix(target_, ".partial")),
+      lock_(partial_) {
   RemoveContent(partial_);
 }
 

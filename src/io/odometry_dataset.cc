@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <sgf/core/error.h>
+#include <sgf/io/absolute_path.h>
 #include <sgf/io/dso_calibration.h>
 #include <sgf/io/exr.h>
 #include <sgf/io/image.h>
@@ -32,14 +33,8 @@ bool IsFolder(const fs::path& path) {
   return fs::is_directory(path, ignored);
 }
 
-// The absolute path of a folder, without a slash at its end.
-fs::path Normal(const fs::path& folder) {
-  const fs::path path = fs::absolute(folder).lexically_normal();
-  return path.has_filename() ? path : path.parent_path();
-}
-
 std::string SequenceName(const fs::path& folder) {
-  const fs::path path = Normal(folder);
+  const fs::path path = internal::AbsolutePath(folder);
   return (path.filename() == "mav0" ? path.parent_path() : path).filename().string();
 }
 
@@ -171,7 +166,7 @@ void OpenKitti(const fs::path& folder, OdometrySequence& sequence) {
     const std::string file = fmt::format("{:06}.png", i);
     AppendFrame(sequence, {times[i], folder / "image_0" / file, folder / "image_1" / file, {}});
   }
-  const fs::path poses = Normal(folder).parent_path().parent_path() / "poses";
+  const fs::path poses = internal::AbsolutePath(folder).parent_path().parent_path() / "poses";
   ReadKittiTruth(poses / (sequence.name + ".txt"), times, sequence);
   if (sequence.frames.empty()) return;
   const cv::Size size = ReadGrey(sequence.frames.front().left).size();

@@ -12,8 +12,6 @@ namespace {
 using Eigen::Array4f;
 using Eigen::Vector3f;
 
-// Rays start this far off a surface (m), so that they do not hit it again.
-constexpr float kLift = 1e-3f;
 // Sky light and light from other surfaces are found on every so many-th texel.
 constexpr int kCoarse = 4;
 constexpr int kBounces = 2;

@@ -1,6 +1,6 @@
 #include <cmath>
-#include <numbers>
 
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/texture_painter.h>
 
 // Pictures that are shown once on a patch, or once in a repeat.
@@ -8,8 +8,6 @@ namespace sgf::synth {
 namespace {
 
 using Box = Canvas::Box;
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 uint64_t Child(uint64_t seed, int k) { return Hash64(seed, static_cast<uint64_t>(k)); }
 

@@ -1,14 +1,12 @@
 #include <cmath>
-#include <numbers>
 
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/texture_painter.h>
 
 // Surfaces that repeat without a seam. The text of each names the length in metres that one image
 // is meant to cover. Everything that depends on (u, v) has period 1 in both.
 namespace sgf::synth {
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
 
 float Px(int size) { return 1.0f / static_cast<float>(size); }
 

@@ -15,6 +15,9 @@ struct RTCRayHit;
 
 namespace sgf::synth::internal {
 
+/// Rays start this far off a surface (m), so that they do not hit it again.
+inline constexpr float kLift = 1e-3f;
+
 /// What a ray hits: a patch of an object, or a lamp.
 struct Surface {
   const Patch* patch = nullptr;        ///< null for lamps

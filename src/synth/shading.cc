@@ -12,8 +12,6 @@ using Eigen::Vector3f;
 
 // Highlights weaker than this share of their peak are left out.
 constexpr float kHighlightCutoff = 1e-3f;
-// Mirrored rays start this far off the surface (m), so that they do not hit it again.
-constexpr float kLift = 1e-3f;
 
 }  // namespace
 

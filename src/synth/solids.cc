@@ -11,6 +11,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/patch.h>
 #include <sgf/synth/tangent.h>
 
@@ -21,7 +22,6 @@ using Eigen::Vector2f;
 using Eigen::Vector3f;
 using Points = std::vector<Vector3f>;
 
-constexpr float kPi = std::numbers::pi_v<float>;
 constexpr int kCornerSegments = 4;  // quads round a quarter of a rounded edge
 // Profiles that turn by more than 41 degrees have an edge there.
 constexpr float kSharpCosine = 0.75f;

@@ -5,6 +5,7 @@
 #include <fmt/core.h>
 
 #include <sgf/core/error.h>
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/texture.h>
 
 namespace sgf::synth {
@@ -38,12 +39,6 @@ Plane HalfLevel(const Plane& fine, int fine_size) {
       level.push_back(0.25f * ((texel[0] + texel[1]) + (texel[fine_size] + texel[fine_size + 1])));
     }
   return level;
-}
-
-// Faster than std::floor, which is a function call without SSE4.1.
-int Floor(float x) {
-  const int i = static_cast<int>(x);
-  return i - (x < static_cast<float>(i));
 }
 
 // Four 16-bit numbers as floats, which GCC and Clang turn into two SSE2 instructions in this form.

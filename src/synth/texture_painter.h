@@ -12,6 +12,7 @@
 
 #include <sgf/core/parallel.h>
 #include <sgf/core/random.h>
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/texture.h>
 
 /// What the procedural textures are made of: noise that repeats, colours, and a canvas with
@@ -31,12 +32,6 @@ inline float Clamp01(float x) { return std::clamp(x, 0.0f, 1.0f); }
 inline float SmoothStep(float a, float b, float x) {
   const float t = Clamp01((x - a) / (b - a));
   return t * t * (3 - 2 * t);
-}
-
-/// Largest whole number not above x. Faster than std::floor, a function call without SSE4.1.
-inline int Floor(float x) {
-  const int i = static_cast<int>(x);
-  return i - (x < static_cast<float>(i));
 }
 
 inline float Fraction(float x) { return x - static_cast<float>(Floor(x)); }

@@ -27,10 +27,6 @@ void Check(const ImuBufferOptions& o) {
     Require(value >= 1 && std::isfinite(value), name, value, "finite and at least 1");
 }
 
-double Seconds(std::int64_t from_ns, std::int64_t to_ns) {
-  return 1e-9 * static_cast<double>(to_ns - from_ns);
-}
-
 ImuSample Interpolate(const ImuSample& a, const ImuSample& b, std::int64_t time_ns) {
   if (time_ns == a.time_ns) return a;
   const double t = Seconds(a.time_ns, time_ns) / Seconds(a.time_ns, b.time_ns);

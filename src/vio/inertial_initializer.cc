@@ -37,9 +37,7 @@ Problem JudgeGravity(double magnitude, double force, const InertialInitializerOp
 }
 
 /// Smallest rotation from a frame to one whose z axis is up.
-Quaterniond TurnUp(const Vector3d& up) {
-  return Quaterniond::FromTwoVectors(up, Vector3d::UnitZ());
-}
+Quaterniond TurnUp(const Vector3d& up) { return RotationBetween(up, Vector3d::UnitZ()); }
 
 /// Mean and standard deviation, axis by axis.
 struct Statistics {

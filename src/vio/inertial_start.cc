@@ -63,8 +63,7 @@ InertialInitialisation InertialStart::StartAtRest(const ImuBuffer& imu) const {
       InitializeAtRest(imu, poses_.front().time_ns, poses_.back().time_ns, options_);
   if (!found.ok()) return found;
   const Vector3d up_body = found.states.back().T_world_body.R.conjugate() * Vector3d::UnitZ();
-  found.T_world_visual.R =
-      Eigen::Quaterniond::FromTwoVectors(poses_.back().pose.R * up_body, Vector3d::UnitZ());
+  found.T_world_visual.R = RotationBetween(poses_.back().pose.R * up_body, Vector3d::UnitZ());
   found.states.assign(poses_.size(), BodyState(found.states.back()));  // the same all the time
   return found;
 }

@@ -34,10 +34,6 @@ void CheckStretch(const ImuSample& begin, const ImuSample& end, std::int64_t to_
                                               begin.time_ns, end.time_ns));
 }
 
-double Seconds(std::int64_t from_ns, std::int64_t to_ns) {
-  return 1e-9 * static_cast<double>(to_ns - from_ns);
-}
-
 /// Samples at the beginning and the end of a stretch and what lies between them in its middle.
 struct Stretch {
   double h;  // s

@@ -201,8 +201,7 @@ class StereoInertialOdometry::Impl {
       for (const ImuSample& sample : imu_.samples()) accel += sample.accel;
       const Vector3d up = frame.state.T_world_body.R * accel;
       frame.state.T_world_body.R =
-          (Eigen::Quaterniond::FromTwoVectors(up, Vector3d::UnitZ()) * frame.state.T_world_body.R)
-              .normalized();
+          (RotationBetween(up, Vector3d::UnitZ()) * frame.state.T_world_body.R).normalized();
     }
     frame.keyframe = true;
     start_.Clear();

@@ -62,6 +62,11 @@ class Rebuild:
     def _compile(self, path, command):
         command = command.replace(f"{self.project}/src/", f"{self.folder}/src/")
         command = command.replace(f"-I{self.build}/include", f"-I{self.folder}/include")
+        source = shlex.split(command)[-1]
+        if source.startswith(f"{self.build}/"):  # several files as one, which CMake has written
+            copy = self.folder / Path(source).relative_to(self.build)
+            copy.write_text(Path(source).read_text().replace(f"{self.project}/src/", f"{self.folder}/src/"))
+            command = command.replace(source, str(copy))
         assert str(self.folder) in command, command
         self._run(f"{command} {shlex.join(FLAGS)}")
 
@@ -80,4 +85,4 @@ class Rebuild:
 
 def _target(path):
     """The target of an object."""
-    return Path(path).parent.name.removesuffix(".dir")
+    return next(part for part in Path(path).parts if part.endswith(".dir")).removesuffix(".dir")

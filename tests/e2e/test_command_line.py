@@ -26,9 +26,9 @@ def sections():
     return found
 
 
-def test_the_four_sections_name_each_package_once():
+def test_the_sections_name_each_package_once():
     found = sections()
-    assert list(found) == ["run", "report", "test", "dev"]
+    assert list(found) == ["run", "report", "test", "sanitize", "dev"]
     every = [package for packages in found.values() for package in packages]
     assert len(every) == len(set(every))
     assert all(re.fullmatch(r"[a-z0-9][a-z0-9+.-]+", package) for package in every)
@@ -236,6 +236,7 @@ def test_the_sanitizers_have_a_build_of_their_own(project):
     assert "cmake --preset sanitize" in log and "cmake --build --preset sanitize" in log
     assert "ctest --preset sanitize --parallel 3" in log
     assert "preset release" not in log and "--target" not in log
+    assert "== packages [run] [report] [test] [sanitize]\n" in output
 
 
 def test_a_run_builds_only_the_programs_and_keeps_a_developers_tests(project):

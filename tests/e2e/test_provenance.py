@@ -15,7 +15,7 @@ from same_results import end, made
 
 # Of each kind of job one and more: programs, scores, tables and figures, and a search with a database.
 STAGES = ["table1", "fig2", "odometry", "table3_vio", "tune_tiny", "scenes"]
-MOMENTS = 10
+MOMENTS = 4  # same_results.py kills the real programs ten times
 
 
 def recorded(project):
@@ -138,6 +138,7 @@ def test_without_a_cluster_it_says_so(project):
     assert code == 1 and ("slurm.conf" in output or "is not installed" in output)
 
 
+@pytest.mark.xdist_group("kills")  # so that what they are compared with is made once
 @pytest.mark.parametrize("moment", range(MOMENTS))
 def test_killed_at_a_random_moment_it_makes_the_same_when_started_again(moment, undisturbed, tmp_path):
     wanted, seconds = undisturbed

@@ -11,6 +11,9 @@
 
 namespace sgf::test {
 
+inline const Camera kCamera{
+    .width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+
 /// Two textured planes that meet in a corner before the camera: z = 4 + x/2 and z = 4 - x/2 (m),
 /// whichever is nearer. Images and depths are computed pixel by pixel.
 class CornerWorld {

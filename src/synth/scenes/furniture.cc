@@ -1,14 +1,10 @@
 #include <cmath>
-#include <numbers>
 
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/scenes/furniture.h>
 
 namespace sgf::synth {
 namespace {
-
-constexpr float kPi = std::numbers::pi_v<float>;
-
-float Radians(float degrees) { return degrees * kPi / 180; }
 
 // One leaf: rises, arches outwards along `direction` and narrows to its tip.
 Patches Leaf(float reach, float rise, float width, float direction) {

@@ -1,11 +1,11 @@
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <fmt/core.h>
 
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/scenes/workshop.h>
 
 // A machine hall of 18 x 10 x 7 m: x in [-9, 9], y in [-5, 5], z in [0, 7]. Everything stands along
@@ -23,8 +23,6 @@ constexpr float kHalfLength = 9;
 constexpr float kHalfWidth = 5;
 constexpr float kHeight = 7;
 constexpr float kFaceNorth = 180, kFaceEast = 90, kFaceWest = -90;
-
-float Radians(float degrees) { return degrees * std::numbers::pi_v<float> / 180; }
 
 // Materials.
 

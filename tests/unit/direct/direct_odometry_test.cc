@@ -14,7 +14,7 @@ namespace {
 
 using testing::HasSubstr;
 
-const Camera kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+using test::kCamera;
 constexpr std::int64_t kPeriod = 50'000'000;  // ns
 
 SE3 PoseAt(int k) {

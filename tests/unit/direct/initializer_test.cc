@@ -8,7 +8,7 @@
 namespace sgf::direct {
 namespace {
 
-const Camera kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+using test::kCamera;
 
 cv::Mat1f ViewFrom(const SE3& T_world_cam, double gain = 1) {
   return test::CornerWorld(kCamera).Render(T_world_cam, gain).grey;

@@ -8,7 +8,7 @@
 namespace sgf::direct {
 namespace {
 
-const Camera kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+using test::kCamera;
 
 alignment::SampleChannels Channels(const cv::Mat& image) {
   return alignment::MakeSampleChannels(image, {});

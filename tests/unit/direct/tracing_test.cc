@@ -12,7 +12,7 @@
 namespace sgf::direct {
 namespace {
 
-const Camera kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+using test::kCamera;
 
 /// A key-frame at the world's origin and views from a camera that moves to the right and ahead.
 struct Scene {

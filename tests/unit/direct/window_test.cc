@@ -12,7 +12,7 @@
 namespace sgf::direct {
 namespace {
 
-const Camera kCamera{.width = 320, .height = 240, .fx = 260, .fy = 260, .cx = 160, .cy = 120};
+using test::kCamera;
 
 SE3 TruthAt(int k) {
   return {ExpSO3({0.01 * k, 0.02 * k, 0.01 * k}), {0.1 * k, 0.02 * k, 0.05 * k}};

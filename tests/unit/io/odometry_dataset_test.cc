@@ -381,8 +381,8 @@ TEST(ReadDepth, GivesMetresAndNanWhereUnknown) {
   EXPECT_FLOAT_EQ(depth(0, 2), 13.107F);
 
   const auto exr = dir.path() / "d.exr";
-  constexpr float kInf = std::numeric_limits<float>::infinity();
-  const cv::Mat1f z = (cv::Mat1f(1, 4) << 1.5F, kInf, 0, -1);
+  const cv::Mat1f z =
+      (cv::Mat1f(1, 4) << 1.5F, std::numeric_limits<float>::infinity(), 0, -1);
   WriteChannel(exr, "Z", {z, ExrStorage::kFloat});
   const cv::Mat1f read = ReadDepth(exr, 5000);
   EXPECT_EQ(read(0, 0), 1.5F);

@@ -151,7 +151,8 @@ TEST(BlockMatcher, DropsMatchesWithoutTexture) {
 }
 
 TEST(BlockMatcher, DropsSpeckles) {
-  auto [left, right] = ShiftedPair({120, 60}, 7, 1);
+  const auto pair = ShiftedPair({120, 60}, 7, 1);
+  const cv::Mat1b left = pair.first, right = pair.second;
   ShiftedPair({9, 9}, 0, 4).first.copyTo(left(cv::Rect(60, 30, 9, 9)));
   ShiftedPair({9, 9}, 0, 4).first.copyTo(right(cv::Rect(45, 30, 9, 9)));  // at disparity 15
   BlockMatcherOptions options = With("sgf");

@@ -114,7 +114,7 @@ TEST(Texture, FootprintOfOneTexelOfALevelGivesItsBoxMean) {
 TEST(Texture, RefusesOtherShapes) {
   EXPECT_THROW(Texture(cv::Mat3f(16, 32)), Error);
   EXPECT_THROW(Texture(cv::Mat3f(24, 24)), Error);
-  EXPECT_THROW(Texture(cv::Mat3f()), Error);
+  EXPECT_THROW(Texture(cv::Mat3f(0, 0)), Error);
 }
 
 constexpr int kSize = 128;
