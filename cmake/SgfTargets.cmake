@@ -32,7 +32,7 @@ endif()
 
 function(sgf_compile_options target)
   if(CMAKE_UNITY_BUILD AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
-    # Of what only the main file sees GCC does not warn, but takes the files that are compiled as one for headers.
+    # GCC takes files that are compiled as one for headers, in which types of anonymous namespaces would be a fault.
     target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
   endif()
   # Same input, same bits: no contraction to fused multiply-add. errno and floating-point traps are
@@ -71,7 +71,8 @@ function(sgf_precompile_headers target)
 endfunction()
 
 # The presets compile up to eight files of a target as one (CMAKE_UNITY_BUILD), as most of the time goes into the
-# same headers and templates. SEPARATE lists sources whose own names clash with those of others; they stay apart.
+# same headers and templates. SEPARATE lists sources that stay apart: their own names clash with those of others, or
+# they take long.
 function(sgf_sources target)
   cmake_parse_arguments(ARG "" "" "SOURCES;SEPARATE" ${ARGN})
   target_sources(${target} PRIVATE ${ARG_SOURCES} ${ARG_SEPARATE})

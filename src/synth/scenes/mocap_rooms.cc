@@ -6,6 +6,7 @@
 
 #include <fmt/core.h>
 
+#include <sgf/synth/arithmetic.h>
 #include <sgf/synth/scenes/workshop.h>
 
 // Two furnishings of one motion-capture room of 8 x 8.5 x 4 m: x in [-4, 4], y in [-4.25, 4.25].
@@ -97,7 +98,7 @@ Parts Mattress(const Material& cover, const Material& piping, float width, float
 
 // A flat thing of that height leaning against a wall at y = 0 behind it.
 Parts Leaning(Parts thing, float height, float lean_deg) {
-  const float foot = height * std::sin(lean_deg * std::numbers::pi_v<float> / 180);
+  const float foot = height * std::sin(Radians(lean_deg));
   return Put(Tilted(std::move(thing), -lean_deg), 0, -foot);
 }
 
